@@ -1,0 +1,60 @@
+"""autostereo: all views of a glasses-free 3D display in one pass.
+
+Names are loaded on first use, so that ``import autostereo`` is instant.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "errors": ["AutostereoError", "InputError", "FileError", "UnsupportedError", "DependencyError", "MemoryLimitError"],
+    "scene.mesh": ["Mesh"],
+    "scene.appearance": ["Material", "DirectionalLight", "PointLight"],
+    "scene.scene": ["Scene"],
+    "display.rig": ["Rig"],
+    "display.display": ["Display"],
+    "frame": ["ViewStack", "Panel"],
+    "viewmap": ["ViewMap"],
+    "engines.options": ["Options"],
+    "render": ["render", "render_views", "Renderer", "interlace", "observe"],
+    "io": ["load"],
+}
+_MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
+
+__all__ = [*_MODULE_OF, "__version__"]
+
+if TYPE_CHECKING:
+    from .display.display import Display
+    from .display.rig import Rig
+    from .engines.options import Options
+    from .errors import (
+        AutostereoError,
+        DependencyError,
+        FileError,
+        InputError,
+        MemoryLimitError,
+        UnsupportedError,
+    )
+    from .frame import Panel, ViewStack
+    from .io import load
+    from .render import Renderer, interlace, observe, render, render_views
+    from .scene.appearance import DirectionalLight, Material, PointLight
+    from .scene.mesh import Mesh
+    from .scene.scene import Scene
+    from .viewmap import ViewMap
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module 'autostereo' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f".{_MODULE_OF[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,196 @@
+"""Rig: a row of parallel cameras that share one window in the focal plane (DESIGN section 1)."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileError, InputError
+from ..image import write_atomic
+from ..transforms import eye_from_world
+from ..viewmap import offset_at
+
+if TYPE_CHECKING:
+    from .display import Display
+
+Vector = tuple[float, float, float]
+SPACINGS = ("linear", "equal-angle", "cell-centred")
+
+
+def _number(name: str, value: object, low: float, high: float, open_low: bool = False) -> float:
+    if isinstance(value, (bool, str)) or not np.isscalar(value):
+        raise InputError(f"rig {name}: expected a number, got {value!r}")
+    number = float(value)  # type: ignore[arg-type]
+    if not np.isfinite(number) or not low <= number <= high or (open_low and number == low):
+        raise InputError(f"rig {name}: expected a number in {'(' if open_low else '['}{low:g}, {high:g}], got {value!r}")
+    return number
+
+
+def _vector(name: str, value: object) -> Vector:
+    try:
+        v = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"rig {name}: expected three numbers, got {value!r}") from None
+    if v.shape != (3,) or not np.isfinite(v).all():
+        raise InputError(f"rig {name}: expected three finite numbers, got {value!r}")
+    return (float(v[0]), float(v[1]), float(v[2]))
+
+
+@dataclass(frozen=True)
+class Rig:
+    """V cameras on one horizontal line, parallel, with off-axis frusta through one window.
+
+    Parameters
+    ----------
+    position, target, up : (3,) float
+        Centre of the line of cameras, a point straight ahead, and the upward direction, in world units.
+    fov_y : float
+        Vertical field of view in degrees of the focal-plane window.
+    focal_distance : float, optional
+        Distance of the plane without parallax; None: |target − position|.
+    baseline : float
+        Distance between the outermost cameras, world units.
+    views : int
+        V; with V = 1 the camera stands at offset 0.
+    spacing : {"linear", "equal-angle", "cell-centred"}
+        Equal steps; equal angles seen from the focal point, ends included; equal angles, centres of V equal cells
+        (displays.md 3.4). With "cell-centred" the baseline spans the cells' outer edges.
+    offsets : sequence of V floats, optional
+        Explicit camera offsets, ascending, instead of baseline and spacing.
+    aspect : float, optional
+        Width/height of the window; None: that of the picture.
+    near : float, optional
+        Depth of the near plane; None: 0.01·focal_distance. There is no far plane.
+    offset_y : float
+        Vertical lens offset o_y, for depth of field.
+    """
+
+    position: Vector = (0.0, 0.0, 4.0)
+    target: Vector = (0.0, 0.0, 0.0)
+    up: Vector = (0.0, 1.0, 0.0)
+    fov_y: float = 36.0
+    focal_distance: float | None = None
+    baseline: float = 1.2
+    views: int = 8
+    spacing: str = "linear"
+    offsets: tuple[float, ...] | None = None
+    aspect: float | None = None
+    near: float | None = None
+    offset_y: float = 0.0
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        for name in ("position", "target", "up"):
+            put(self, name, _vector(name, getattr(self, name)))
+        eye_from_world(self.position, self.target, self.up)  # raises if degenerate
+        put(self, "fov_y", _number("fov_y", self.fov_y, 0.0, 179.0, open_low=True))
+        put(self, "baseline", _number("baseline", self.baseline, 0.0, 1e30))
+        put(self, "offset_y", _number("offset_y", self.offset_y, -1e30, 1e30))
+        for name in ("focal_distance", "aspect", "near"):
+            if getattr(self, name) is not None:
+                put(self, name, _number(name, getattr(self, name), 0.0, 1e30, open_low=True))
+        if isinstance(self.views, bool) or not isinstance(self.views, (int, np.integer)) or self.views < 1:
+            raise InputError(f"rig views: expected a whole number ≥ 1, got {self.views!r}")
+        if self.spacing not in SPACINGS:
+            raise InputError(f"rig spacing: expected one of {', '.join(SPACINGS)}, got {self.spacing!r}")
+        if self.offsets is not None:
+            self._check_offsets()
+        put(self, "views", int(self.views))
+
+    def _check_offsets(self) -> None:
+        try:
+            given = np.asarray(self.offsets, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"rig offsets: expected numbers, got {self.offsets!r}") from None
+        if given.ndim != 1 or given.size == 0 or not np.isfinite(given).all() or (np.diff(given) <= 0).any():
+            raise InputError("rig offsets: expected finite numbers, strictly ascending (view 0 is the leftmost)")
+        if self.views not in (given.size, Rig.views):
+            raise InputError(f"rig offsets: expected {self.views} numbers (views), got {given.size}")
+        object.__setattr__(self, "offsets", tuple(float(o) for o in given))
+        object.__setattr__(self, "views", int(given.size))
+        object.__setattr__(self, "baseline", float(given[-1] - given[0]))
+
+    @property
+    def focal(self) -> float:
+        """Focal distance fd in world units."""
+        if self.focal_distance is not None:
+            return self.focal_distance
+        return float(np.linalg.norm(np.subtract(self.target, self.position)))
+
+    @property
+    def near_depth(self) -> float:
+        """Depth of the near plane in world units."""
+        return 0.01 * self.focal if self.near is None else self.near
+
+    @property
+    def camera_offsets(self) -> NDArray[np.float64]:
+        """Camera offsets vd_i (V,), ascending, world units; view 0 is the leftmost."""
+        if self.offsets is not None:
+            return np.array(self.offsets)
+        if self.views == 1:
+            return np.zeros(1)
+        i = np.arange(self.views)
+        if self.spacing == "linear":
+            return (i - (self.views - 1) / 2) * (self.baseline / (self.views - 1))
+        half = np.arctan(self.baseline / 2 / self.focal)
+        step = i / (self.views - 1) if self.spacing == "equal-angle" else (i + 0.5) / self.views
+        return self.focal * np.tan((2 * step - 1) * half)
+
+    def offset_at(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Camera offset at camera coordinates u: piecewise linear through the cameras, continued beyond the ends."""
+        return offset_at(self.camera_offsets, u)
+
+    @property
+    def eye_from_world(self) -> NDArray[np.float64]:
+        """Centre camera's transform, (4, 4): x right, y up, z = depth."""
+        return eye_from_world(self.position, self.target, self.up)
+
+    def with_views(self, views: int) -> Rig:
+        """The same rig with `views` cameras over its baseline; explicit offsets must already be that many."""
+        if self.offsets is not None:
+            if len(self.offsets) != views:
+                raise InputError(f"rig offsets: the display has {views} views, the rig gives {len(self.offsets)} offsets")
+            return self
+        return replace(self, views=views)
+
+    @classmethod
+    def frame(cls, scene: Any, display: Display) -> Rig:
+        """Choose a rig that shows the whole of `scene` in every view of `display`, comfortably.
+
+        The whole bounding box is in view in every view, and the disparity between adjacent views stays within
+        the display's comfort limit (displays.md 3.4).
+        """
+        from .framing import frame_rig
+
+        return frame_rig(scene, display)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the fields as JSON."""
+        text = json.dumps({k: v for k, v in asdict(self).items() if v is not None}, indent=2)
+        return write_atomic(path, lambda file: file.write(text.encode() + b"\n"))
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Rig:
+        """Read a JSON file of rig fields; unknown fields are errors."""
+        path = Path(path)
+        try:
+            fields = json.loads(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise FileError(f"{path}: cannot be read ({error.strerror})") from error
+        except (UnicodeDecodeError, json.JSONDecodeError) as error:
+            raise FileError(f"{path}: expected a rig as JSON ({error})") from error
+        if not isinstance(fields, dict):
+            raise FileError(f"{path}: expected a JSON object of rig fields, got {type(fields).__name__}")
+        unknown = set(fields) - set(cls.__dataclass_fields__)
+        if unknown:
+            raise FileError(f"{path}: unknown rig fields {', '.join(sorted(unknown))}")
+        try:
+            return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()})
+        except InputError as error:
+            raise FileError(f"{path}: {error}") from error

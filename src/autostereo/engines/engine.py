@@ -1,0 +1,126 @@
+"""What an engine is: prepare a scene, draw it, gather pictures. The ENGINES table lists every one.
+
+An engine knows arrays, camera offsets, a view map and a target. It knows neither displays nor files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UnsupportedError
+from ..scene.scene import Scene
+from ..viewmap import ViewMap
+from .options import Options
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """The centre camera of a rig at one picture size: all that a projection needs (DESIGN section 1).
+
+    For an eye-space point (X, Y, d) and a camera at offset vd:
+    x = width/2 + fx·X/d + fx·vd·(1/focal − 1/d),  y = height/2 − fy·(Y − offset_y)/d − fy·offset_y/focal.
+    """
+
+    eye_from_world: NDArray[np.float64]
+    fx: float
+    fy: float
+    width: int
+    height: int
+    focal: float
+    near: float
+    offset_y: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Draw:
+    """One traversal of the scene.
+
+    Attributes
+    ----------
+    camera : Camera
+    offsets : ndarray of shape (V,), float64
+        Camera offsets of the views to draw, ascending.
+    culling : (float, float)
+        Range of offsets over which culling must be conservative. It is that of the whole rig, also when
+        a pass draws one view of it, so that every method draws exactly the same triangles.
+    viewmap : ViewMap, optional
+        None: draw a stack of views. Else draw the interlaced panel; `offsets` are then those of its V views.
+    flip_x, flip_y : bool
+        Panel only: the panel shows the picture mirrored.
+    options : Options
+    """
+
+    camera: Camera
+    offsets: NDArray[np.float64]
+    culling: tuple[float, float]
+    viewmap: ViewMap | None = None
+    flip_x: bool = False
+    flip_y: bool = False
+    options: Options = Options()
+
+
+@dataclass(eq=False)
+class Target:
+    """Arrays that a draw fills.
+
+    Attributes
+    ----------
+    color : ndarray of shape (V, H, W, 4) for views or (H, W, 3) for a panel, uint8, C-contiguous
+    depth : ndarray of shape (V, H, W), float32, optional
+    covered, reused : int
+        Counters: shaded samples, and those of them whose colour was reused.
+    """
+
+    color: NDArray[np.uint8]
+    depth: NDArray[np.float32] | None = None
+    covered: int = 0
+    reused: int = 0
+
+
+class Engine(Protocol):
+    """A way to draw. `prepare` once per scene, `draw` once per frame and pass."""
+
+    name: str
+    methods: tuple[str, ...]
+
+    def prepare(self, scene: Scene) -> Any:
+        """Turn a scene into what this engine draws fastest."""
+
+    def draw(self, prepared: Any, draw: Draw, target: Target) -> None:
+        """Fill `target`."""
+
+    def interlace(self, views: NDArray[np.uint8], draw: Draw, out: NDArray[np.uint8]) -> None:
+        """Gather out[r, x, c] from views (V, H, W, 4) by `draw.viewmap`, with flips; u is rounded to a view."""
+
+
+def _cpu() -> Engine:
+    from .cpu.engine import CpuEngine
+
+    return CpuEngine()
+
+
+def _reference() -> Engine:
+    from .reference.engine import ReferenceEngine
+
+    return ReferenceEngine()
+
+
+ENGINES: dict[str, Callable[[], Engine]] = {"cpu": _cpu, "reference": _reference}
+
+_made: dict[str, Engine] = {}
+
+
+def get_engine(name: str) -> Engine:
+    """Return the engine called `name`; "auto" is the fastest there is."""
+    if name == "auto":
+        name = "cpu"
+    if name not in ENGINES:
+        raise UnsupportedError(f"engine {name!r}: there are {', '.join(ENGINES)} and auto")
+    if name not in _made:
+        _made[name] = ENGINES[name]()
+    return _made[name]

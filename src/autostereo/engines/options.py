@@ -1,0 +1,65 @@
+"""Options: every switch of a render, validated in one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..errors import InputError
+
+CHOICES: dict[str, tuple[object, ...]] = {
+    "shading": ("exact", "center", "reuse"),
+    "lighting": ("sample", "vertex"),
+    "sampling": ("pixel", "subpixel"),
+    "samples": (1, 4, 16, 64),
+    "depth": (False, True),
+    "alpha": ("exact", "averaged"),
+    "volume": ("shared", "exact"),
+}
+
+
+@dataclass(frozen=True)
+class Options:
+    """Switches of a render.
+
+    Parameters
+    ----------
+    shading : {"exact", "center", "reuse"}
+        Shade every sample for its own eye, for the centre eye, or reuse the colour of a nearby view
+        (Hasselgren 2006, section 4.3).
+    lighting : {"sample", "vertex"}
+        Light every sample, or light vertices (for the centre eye) and interpolate.
+    sampling : {"pixel", "subpixel"}
+        Panels: sample the scene at the pixel's centre or at the sub-pixel's own centre.
+    samples : {1, 4, 16, 64}
+        Samples per pixel, on a regular grid.
+    depth : bool
+        Also return eye depth (view stacks only).
+    alpha, volume, step, views_per_pass, groups
+        For volumes, the OpenGL engine's geometry shader and splats.
+    """
+
+    shading: str = "exact"
+    lighting: str = "sample"
+    sampling: str = "pixel"
+    samples: int = 1
+    depth: bool = False
+    alpha: str = "exact"
+    volume: str = "shared"
+    step: float = 1.0
+    views_per_pass: int | None = None
+    groups: int = 8
+
+    def __post_init__(self) -> None:
+        for name, choices in CHOICES.items():
+            value = getattr(self, name)
+            if not any(value == c and type(value) is type(c) for c in choices):
+                wanted = ", ".join(repr(c) for c in choices)
+                raise InputError(f"options {name}: expected one of {wanted}, got {value!r}")
+        if isinstance(self.step, bool) or not isinstance(self.step, (int, float)) or not 0 < self.step < 1e6:
+            raise InputError(f"options step: expected a number > 0, got {self.step!r}")
+        for name in ("views_per_pass", "groups"):
+            value = getattr(self, name)
+            if name == "views_per_pass" and value is None:
+                continue
+            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+                raise InputError(f"options {name}: expected a whole number ≥ 1, got {value!r}")

@@ -1,0 +1,148 @@
+"""What a render returns: a stack of views, or one interlaced panel."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import FileError, InputError
+from .image import write_atomic, write_image
+
+
+@dataclass(frozen=True, eq=False)
+class ViewStack:
+    """V pictures of one scene, from left to right.
+
+    Attributes
+    ----------
+    color : ndarray of shape (V, H, W, 4), uint8
+        RGB composited over the background, A = opacity; rows from the top, view 0 the leftmost camera.
+    depth : ndarray of shape (V, H, W), float32, optional
+        Eye depth; inf where nothing was hit.
+    reused : float, optional
+        Share of the covered samples whose colour was reused from a nearby view (`shading="reuse"` only).
+    """
+
+    color: NDArray[np.uint8]
+    depth: NDArray[np.float32] | None = None
+    reused: float | None = None
+
+    def __post_init__(self) -> None:
+        color = np.asarray(self.color)
+        if color.ndim != 4 or color.shape[3] != 4 or color.dtype != np.uint8 or 0 in color.shape:
+            raise InputError(f"color: expected (V, H, W, 4) uint8, got {color.shape} {color.dtype}")
+        if self.depth is not None and np.shape(self.depth) != color.shape[:3]:
+            raise InputError(f"depth: expected shape {color.shape[:3]}, got {np.shape(self.depth)}")
+
+    @property
+    def views(self) -> int:
+        """Number of views V."""
+        return self.color.shape[0]
+
+    @property
+    def height(self) -> int:
+        """Rows H of one view."""
+        return self.color.shape[1]
+
+    @property
+    def width(self) -> int:
+        """Columns W of one view."""
+        return self.color.shape[2]
+
+    def quilt(self, columns: int, rows: int) -> NDArray[np.uint8]:
+        """Tile the views into one picture, view 0 at the bottom left, row by row upwards.
+
+        Parameters
+        ----------
+        columns, rows : int
+            C and R; C·R ≥ V. Tiles without a view stay black and opaque.
+
+        Returns
+        -------
+        ndarray of shape (R·H, C·W, 4), uint8
+        """
+        if columns < 1 or rows < 1 or columns * rows < self.views:
+            raise InputError(f"quilt: {columns}×{rows} tiles cannot hold {self.views} views")
+        quilt = np.zeros((rows, self.height, columns, self.width, 4), dtype=np.uint8)
+        quilt[..., 3] = 255
+        for k in range(self.views):
+            quilt[rows - 1 - k // columns, :, k % columns] = self.color[k]
+        return quilt.reshape(rows * self.height, columns * self.width, 4)
+
+    @staticmethod
+    def from_quilt(quilt: NDArray[np.uint8], columns: int, rows: int, views: int | None = None) -> ViewStack:
+        """Cut a quilt (H', W', 3|4) into its views; rows and columns left over at the right and top are padding.
+
+        The used part of the picture is C·⌊W'/C⌋ × R·⌊H'/R⌋ pixels, counted from the bottom left (displays.md 3.1).
+        """
+        quilt = np.asarray(quilt)
+        if quilt.ndim != 3 or quilt.shape[2] not in (3, 4) or quilt.dtype != np.uint8:
+            raise InputError(f"quilt: expected (H, W, 3 or 4) uint8, got {quilt.shape} {quilt.dtype}")
+        count = columns * rows if views is None else views
+        height, width = quilt.shape[0] // max(rows, 1), quilt.shape[1] // max(columns, 1)
+        if columns < 1 or rows < 1 or not 1 <= count <= columns * rows or height < 1 or width < 1:
+            raise InputError(f"quilt: {quilt.shape[1]}×{quilt.shape[0]} pixels cannot be {columns}×{rows} tiles")
+        color = np.full((count, height, width, 4), 255, dtype=np.uint8)
+        bottom = quilt.shape[0]
+        for k in range(count):
+            top, left = bottom - (k // columns + 1) * height, (k % columns) * width
+            color[k, :, :, : quilt.shape[2]] = quilt[top : top + height, left : left + width]
+        return ViewStack(color)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write `path`.npz (arrays `color`, `depth`), or a folder of view_000.png, view_001.png, …
+
+        A folder is created when its parent exists.
+        """
+        path = Path(path)
+        if path.suffix == ".npz":
+            arrays = {"color": self.color} | ({} if self.depth is None else {"depth": self.depth})
+            return write_atomic(path, lambda file: np.savez_compressed(file, allow_pickle=False, **arrays))
+        if path.suffix:
+            raise InputError(f"{path}: expected a folder or a .npz file for a view stack")
+        try:
+            path.mkdir(exist_ok=True)
+        except OSError as error:
+            raise FileError(f"{path}: cannot be created ({error.strerror})") from error
+        for k in range(self.views):
+            write_image(path / f"view_{k:03d}.png", self.color[k])
+        return path
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """The picture a panel shows, every sub-pixel from its own camera.
+
+    Attributes
+    ----------
+    pixels : ndarray of shape (H, W, 3), uint8
+        Rows from the top.
+    reused : float, optional
+        Share of the covered samples whose colour was reused (`shading="reuse"` only).
+    """
+
+    pixels: NDArray[np.uint8]
+    reused: float | None = None
+
+    def __post_init__(self) -> None:
+        pixels = np.asarray(self.pixels)
+        if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.dtype != np.uint8 or 0 in pixels.shape:
+            raise InputError(f"pixels: expected (H, W, 3) uint8, got {pixels.shape} {pixels.dtype}")
+
+    @property
+    def height(self) -> int:
+        """Rows H."""
+        return self.pixels.shape[0]
+
+    @property
+    def width(self) -> int:
+        """Columns W."""
+        return self.pixels.shape[1]
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write an image file; png and webp are lossless, others blur neighbouring views into each other."""
+        return write_image(path, self.pixels)

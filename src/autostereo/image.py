@@ -1,0 +1,66 @@
+"""Image files, written to a temporary name beside the target and then renamed."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import FileError, InputError
+
+IMAGE_SUFFIXES = (".png", ".webp", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
+
+
+def write_atomic(path: str | os.PathLike[str], write: Callable[[BinaryIO], object]) -> Path:
+    """Let `write` fill a temporary file in the folder of `path`, then rename it to `path`.
+
+    Raises
+    ------
+    FileError
+        The folder does not exist or cannot be written. Nothing is left behind.
+    """
+    path = Path(path)
+    folder = path.parent
+    if not folder.is_dir():
+        raise FileError(f"{path}: the folder {folder} does not exist")
+    if path.is_dir():
+        raise FileError(f"{path}: expected a file name, found a folder")
+    temporary = folder / f".{path.name}.{secrets.token_hex(4)}.part"
+    try:
+        with open(temporary, "wb") as file:
+            write(file)
+        os.replace(temporary, path)
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written ({error.strerror or error})") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+    return path
+
+
+def write_image(path: str | os.PathLike[str], pixels: NDArray[np.uint8]) -> Path:
+    """Write (H, W, 3|4) uint8 pixels, rows from the top; the suffix chooses the format.
+
+    PNG is compressed at level 1: at panel sizes a higher level costs seconds and saves a few per cent.
+    """
+    from PIL import Image
+
+    path = Path(path)
+    if path.suffix.lower() not in IMAGE_SUFFIXES:
+        raise InputError(f"{path}: expected an image suffix ({' '.join(IMAGE_SUFFIXES)}), got {path.suffix!r}")
+    pixels = np.ascontiguousarray(pixels)
+    if pixels.dtype != np.uint8 or pixels.ndim != 3 or pixels.shape[2] not in (3, 4):
+        raise InputError(f"pixels: expected (H, W, 3 or 4) uint8, got {pixels.shape} {pixels.dtype}")
+    image = Image.fromarray(pixels)
+    options: dict[str, object] = {".png": {"compress_level": 1}, ".webp": {"lossless": True, "method": 0}}.get(
+        path.suffix.lower(), {"quality": 95}
+    )
+    if path.suffix.lower() in (".jpg", ".jpeg"):
+        image = image.convert("RGB")
+        options["subsampling"] = 0  # chroma subsampling would mix neighbouring views
+    kind = Image.registered_extensions()[path.suffix.lower()]
+    return write_atomic(path, lambda file: image.save(file, format=kind, **options))  # type: ignore[arg-type]

@@ -1,0 +1,180 @@
+"""Triangle meshes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from ..transforms import apply, as_transform
+from .appearance import Material, check_image
+
+
+def _floats(name: str, value: ArrayLike, columns: tuple[int, ...], count: int | None = None) -> NDArray[np.float64]:
+    """Return a finite float64 array of shape (count, one of columns), or raise an error that names the field."""
+    try:
+        a = np.array(value, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: expected an array of numbers, got {type(value).__name__}") from None
+    wanted = " or ".join(f"({'N' if count is None else count}, {c})" for c in columns)
+    if a.ndim != 2 or a.shape[1] not in columns or (count is not None and a.shape[0] != count):
+        raise InputError(f"{name}: expected shape {wanted}, got {a.shape}")
+    bad = ~np.isfinite(a).all(axis=1)
+    if bad.any():
+        raise InputError(f"{name}: expected finite numbers, found NaN or infinity in {bad.sum()} of {len(a)} rows")
+    return a
+
+
+def _colors(value: ArrayLike, count: int) -> NDArray[np.float32]:
+    """Return colours as (N, 3) float32 in 0…1; integers count as 0…255, alpha is ignored."""
+    raw = np.asarray(value)
+    a = _floats("colors", value, (3, 4), count)[:, :3]
+    if np.issubdtype(raw.dtype, np.integer):
+        a = a / 255.0
+    if a.size and (a.min() < 0 or a.max() > 1):
+        raise InputError(f"colors: expected 0…1 (float) or 0…255 (uint8), found {a.min():g}…{a.max():g}")
+    return np.ascontiguousarray(a, dtype=np.float32)
+
+
+def _faces(value: ArrayLike, count: int) -> NDArray[np.int32]:
+    raw = np.asarray(value)
+    if raw.ndim != 2 or raw.shape[1] != 3:
+        raise InputError(f"faces: expected shape (F, 3), got {raw.shape}")
+    if len(raw) == 0:
+        raise InputError("faces: expected at least one triangle, got none")
+    if not np.issubdtype(raw.dtype, np.integer):
+        raise InputError(f"faces: expected integers, got {raw.dtype}")
+    if raw.min() < 0 or raw.max() >= count:
+        raise InputError(f"faces: expected indices 0…{count - 1}, found {raw.min()}…{raw.max()}")
+    return np.ascontiguousarray(raw, dtype=np.int32)
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles with shared vertices; counter-clockwise seen from the front.
+
+    Parameters
+    ----------
+    vertices : array_like of shape (N, 3)
+        Positions in object space, finite.
+    faces : array_like of shape (F, 3), int
+        Vertex indices; duplicate and zero-area faces are legal.
+    normals : array_like of shape (N, 3), optional
+        Missing normals are angle-weighted over vertices merged by position.
+    colors : array_like of shape (N, 3 or 4), optional
+        Display (sRGB) values, float 0…1 or uint8; alpha is ignored. Default white.
+    uv : array_like of shape (N, 2), optional
+        Texture coordinates, (0, 0) the bottom left of the texture; they repeat.
+    texture : image of shape (h, w, 3 or 4), optional
+        uint8 or float 0…1, or a PIL image; needs `uv`.
+    material : Material, optional
+    transform : array_like of shape (4, 4), optional
+        world_from_object.
+
+    Raises
+    ------
+    InputError
+        A field does not have the shape, type or range above; the message names it.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    normals: NDArray[np.float64] | None = None
+    colors: NDArray[np.float32] | None = None
+    uv: NDArray[np.float64] | None = None
+    texture: NDArray[np.uint8] | None = None
+    material: Material | None = None
+    transform: NDArray[np.float64] | None = None
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "vertices", _floats("vertices", self.vertices, (3,)))
+        count = len(self.vertices)
+        if np.abs(self.vertices).max(initial=0.0) > 1e30:
+            raise InputError("vertices: coordinates beyond ±1e30 cannot be rendered")
+        put(self, "faces", _faces(self.faces, count))
+        if self.normals is not None:
+            put(self, "normals", _floats("normals", self.normals, (3,), count))
+        if self.colors is not None:
+            put(self, "colors", _colors(self.colors, count))
+        if self.uv is not None:
+            put(self, "uv", _floats("uv", self.uv, (2,), count))
+        if self.texture is not None:
+            if self.uv is None:
+                raise InputError("texture: needs uv (N, 2) to be given too")
+            put(self, "texture", check_image("texture", self.texture))
+        if self.material is None:
+            put(self, "material", Material())
+        elif not isinstance(self.material, Material):
+            raise InputError(f"material: expected a Material, got {type(self.material).__name__}")
+        put(self, "transform", as_transform(self.transform))
+
+    @cached_property
+    def bounds(self) -> NDArray[np.float64]:
+        """Axis-aligned bounds in world space of the vertices that faces use, (2, 3): minimum and maximum."""
+        used = np.zeros(len(self.vertices), dtype=bool)
+        used[self.faces] = True
+        points = apply(self.transform, self.vertices[used])
+        return np.stack([points.min(axis=0), points.max(axis=0)])
+
+    @cached_property
+    def _merged_faces(self) -> NDArray[np.int64]:
+        """Faces (F, 3) over vertices merged by equal position."""
+        points = self.vertices + 0.0  # −0 and 0 are one position
+        bits = points.view(np.uint64)
+        mixed = bits * np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
+        key = mixed[:, 0] ^ np.roll(mixed, 1, axis=1)[:, 2] >> np.uint64(7) ^ mixed[:, 2] << np.uint64(3)
+        _, first, group = np.unique(key, return_index=True, return_inverse=True)
+        if not np.array_equal(points[first[group]], points):  # two positions shared a key
+            _, group = np.unique(points, axis=0, return_inverse=True)
+        return group.reshape(-1)[self.faces]
+
+    @cached_property
+    def shading_normals(self) -> NDArray[np.float64]:
+        """Unit normals (N, 3): those given, else angle-weighted over merged vertices (Thürmer and Wüthrich 1998)."""
+        if self.normals is not None:
+            length = np.linalg.norm(self.normals, axis=1, keepdims=True)
+            return self.normals / np.where(length > 0, length, 1.0)
+        merged = self._merged_faces
+        corner = self.vertices[self.faces]  # (F, 3 corners, 3)
+        scale = np.abs(corner - corner[:, :1]).max(initial=0.0) or 1.0
+        edge = (np.roll(corner, -1, axis=1) - corner) / scale
+        normal = np.cross(edge[:, 0], edge[:, 1])
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        normal /= np.where(length > 0, length, 1.0)
+        incoming = -np.roll(edge, 1, axis=1)
+        angle = np.arctan2(
+            np.linalg.norm(np.cross(edge, incoming), axis=2), np.einsum("fkc,fkc->fk", edge, incoming)
+        )
+        total = np.zeros((int(merged.max()) + 1, 3))
+        for axis in range(3):
+            weight = (angle * normal[:, None, axis]).ravel()
+            total[:, axis] = np.bincount(merged.ravel(), weights=weight, minlength=len(total))
+        total /= np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
+        result = np.zeros_like(self.vertices)
+        result[self.faces.ravel()] = total[merged.ravel()]
+        return result
+
+    @cached_property
+    def is_closed(self) -> bool:
+        """True when the surface is watertight, consistently wound and its front is the outside."""
+        merged = self._merged_faces
+        merged = merged[(merged != np.roll(merged, 1, axis=1)).all(axis=1)]
+        if len(merged) == 0:
+            return False
+        start, end = merged.ravel(), np.roll(merged, -1, axis=1).ravel()
+        count = int(merged.max()) + 1
+        forward, backward = np.sort(start * count + end), np.sort(end * count + start)
+        if not np.array_equal(forward, backward) or (forward[1:] == forward[:-1]).any():
+            return False
+        corner = self.vertices[self.faces] - self.vertices[self.faces[0, 0]]
+        return bool(np.einsum("fc,fc->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) > 0)
+
+    @property
+    def two_sided(self) -> bool:
+        """Whether back sides are drawn: as the material says, else unless the surface is closed."""
+        chosen = self.material.two_sided if self.material is not None else None
+        return not self.is_closed if chosen is None else chosen
