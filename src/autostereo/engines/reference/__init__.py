@@ -1,0 +1,1 @@
+"""The specification and test oracle: NumPy in float64, slow, obviously right."""

@@ -1,0 +1,166 @@
+"""The reference engine: the scene is traced sample by sample, for each view's own camera."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import UnsupportedError
+from ...scene.appearance import Light
+from ...scene.mesh import Mesh
+from ...scene.scene import Scene
+from ...viewmap import offset_at
+from ..engine import Camera, Draw, Target
+from ..options import Options
+from .mesh import Hits, Samples, Surface, trace
+from .shading import lights_in_eye_space, shade
+
+Array = NDArray[np.float64]
+
+PREPARE: dict[type, Callable[[Any], Surface]] = {Mesh: Surface.of}
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedScene:
+    """A scene in world space, ready to be traced."""
+
+    surfaces: list[Surface]
+    lights: tuple[Light, ...] | None
+    background: NDArray[np.uint8]
+
+
+class ReferenceEngine:
+    """Says what the right picture is. Every method draws the same samples, so its methods cannot differ."""
+
+    name = "reference"
+    methods: tuple[str, ...] = ("single-pass", "n-pass")
+
+    def prepare(self, scene: Scene) -> PreparedScene:
+        """Bring all objects into world space.
+
+        Raises
+        ------
+        UnsupportedError
+            The scene holds something that this engine does not draw.
+        """
+        for item in scene.objects:
+            if type(item) not in PREPARE:
+                names = ", ".join(kind.__name__ for kind in PREPARE)
+                raise UnsupportedError(f"engine reference draws {names}, the scene holds a {type(item).__name__}")
+        surfaces = [PREPARE[type(item)](item) for item in scene.objects]
+        return PreparedScene(surfaces, scene.lights, quantize(np.append(scene.background, 0.0)))
+
+    def draw(self, prepared: PreparedScene, draw: Draw, target: Target) -> None:
+        """Fill `target`: view by view, or the panel's sub-pixels."""
+        if draw.viewmap is not None:
+            self._draw_panel(prepared, draw, target)
+            return
+        for i, offset in enumerate(draw.offsets):
+            samples = view_samples(draw.camera, offset, draw.options.samples)
+            color, depth, covered = picture(prepared, samples, draw.camera, draw.options)
+            target.color[i] = mean_color(color, axis=2)
+            if target.depth is not None:
+                target.depth[i] = depth.min(axis=2)
+            target.covered += covered
+
+    def _draw_panel(self, prepared: PreparedScene, draw: Draw, target: Target) -> None:
+        """Each sub-pixel shows its own channel of what its own camera sees."""
+        samples = panel_samples(draw)
+        color, _, covered = picture(prepared, samples, draw.camera, draw.options)
+        channels = np.stack([color[:, :, c, :, c] for c in range(3)], axis=2)  # (H, W, 3, n)
+        target.color[flips(draw)] = mean_color(channels[..., None], axis=3)[..., 0]
+        target.covered += covered
+
+    def interlace(self, views: NDArray[np.uint8], draw: Draw, out: NDArray[np.uint8]) -> None:
+        """Gather out[r, x, c] from views (V, H, W, 4) by `draw.viewmap`, with flips; u is rounded to a view."""
+        assert draw.viewmap is not None
+        height, width, _ = out.shape
+        rows, columns = np.arange(height), np.arange(width)
+        view = draw.viewmap.view(rows, columns)
+        r = (height - 1 - rows if draw.flip_y else rows)[:, None, None]
+        x = (width - 1 - columns if draw.flip_x else columns)[None, :, None]
+        out[...] = views[view, r, x, np.arange(3)]
+
+
+def flips(draw: Draw) -> tuple[slice, slice]:
+    """Index that turns a picture (H, W, …) into what the panel is sent, and back."""
+    return slice(None, None, -1 if draw.flip_y else 1), slice(None, None, -1 if draw.flip_x else 1)
+
+
+def subsample_grid(samples: int) -> tuple[Array, Array]:
+    """Positions (n,), (n,) of the samples of a pixel in x and y: a regular k×k grid at (j + ½)/k, n = k²."""
+    k = round(samples**0.5)
+    y, x = np.divmod(np.arange(k * k), k)
+    return (x + 0.5) / k, (y + 0.5) / k
+
+
+def view_samples(camera: Camera, offset: float, samples: int) -> Samples:
+    """Samples (H, W, n) of one view."""
+    dx, dy = subsample_grid(samples)
+    x = np.arange(camera.width)[None, :, None] + dx
+    y = np.arange(camera.height)[:, None, None] + dy
+    return Samples(*np.broadcast_arrays(x, y, np.float64(offset)))
+
+
+def panel_samples(draw: Draw) -> Samples:
+    """Samples (H, W, 3, n) of a panel's picture, before it is mirrored: column x, channel c of row r.
+
+    The view map is evaluated at the pixel where the panel shows the sample. With `sampling="subpixel"` a channel
+    is sampled within its own third of the pixel, left to right.
+    """
+    assert draw.viewmap is not None
+    camera, viewmap = draw.camera, draw.viewmap
+    rows, columns = np.arange(camera.height), np.arange(camera.width)
+    if viewmap.continuous:
+        v = offset_at(draw.offsets, viewmap.camera(rows, columns))
+    else:
+        v = draw.offsets[viewmap.view(rows, columns)]
+    v = v[flips(draw)][..., None]
+    dx, dy = subsample_grid(draw.options.samples)
+    if draw.options.sampling == "subpixel":
+        dx = (np.arange(3)[:, None] + dx) / 3
+    x = columns[None, :, None, None] + dx
+    y = rows[:, None, None, None] + dy
+    return Samples(*np.broadcast_arrays(x, y, v))
+
+
+def visible_hits(surfaces: list[Surface], camera: Camera, samples: Samples) -> Hits:
+    """What the samples see of surfaces in eye space; triangles are counted through all of them."""
+    corners = np.concatenate([s.vertices[s.faces] for s in surfaces])
+    sides = [np.full(len(s.faces), 0 if s.two_sided else -1 if s.mirrored else 1) for s in surfaces]
+    return trace(corners, np.concatenate(sides), camera, samples)
+
+
+def picture(
+    prepared: PreparedScene, samples: Samples, camera: Camera, options: Options
+) -> tuple[NDArray[np.uint8], NDArray[np.float32], int]:
+    """Colour (…, 4) and depth (…) of samples (…), and how many were covered."""
+    surfaces = [surface.in_eye_space(camera) for surface in prepared.surfaces]
+    lights = lights_in_eye_space(prepared.lights, camera)
+    hits = visible_hits(surfaces, camera, samples)
+    color = np.empty((*samples.x.shape, 4), dtype=np.uint8)
+    color[...] = prepared.background
+    depth = np.full(samples.x.shape, np.inf, dtype=np.float32)
+    depth[hits.where] = hits.depth
+    first = 0
+    for surface in surfaces:
+        mine = hits.on(first, first + len(surface.faces))
+        rgb = shade(surface, mine, samples, camera, lights, options)
+        color[mine.where] = quantize(np.column_stack([rgb, np.ones(len(rgb))]))
+        first += len(surface.faces)
+    return color, depth, len(hits.triangle)
+
+
+def quantize(values: Array) -> NDArray[np.uint8]:
+    """uint8 = ⌊255·v + ½⌋ of values clamped to 0…1."""
+    return np.floor(255.0 * np.clip(values, 0.0, 1.0) + 0.5).astype(np.uint8)
+
+
+def mean_color(samples: NDArray[np.uint8], axis: int) -> NDArray[np.uint8]:
+    """Mean of quantised samples over an axis, rounded half up."""
+    n = samples.shape[axis]
+    return ((samples.sum(axis=axis, dtype=np.int64) + n // 2) // n).astype(np.uint8)
