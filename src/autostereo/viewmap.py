@@ -70,7 +70,7 @@ class ViewMap:
     reverse: bool = False
 
     def __post_init__(self) -> None:
-        if not isinstance(self.views, (int, np.integer)) or self.views < 1:
+        if isinstance(self.views, bool) or not isinstance(self.views, (int, np.integer)) or self.views < 1:
             raise InputError(f"views: expected a whole number ≥ 1, got {self.views!r}")
         if (self.table is None) == (self.offsets is None):
             raise InputError("view map: give either a table or a phase (a, b, offsets)")
@@ -101,6 +101,8 @@ class ViewMap:
             raise InputError("view map: expected finite phase coefficients")
         if self.cell_mode not in CELL_MODES:
             raise InputError(f"cell_mode: expected one of {CELL_MODES}, got {self.cell_mode}")
+        if self.cell_mode != 0 and self.height < 1:
+            raise InputError(f"height: cells need the panel's number of rows, got {self.height}")
         object.__setattr__(self, "offsets", offsets)
 
     def phase(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.float64]:
