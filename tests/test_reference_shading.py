@@ -36,7 +36,7 @@ def lit_by_hand(point, normal, eye, kd, material, lights):
 def test_samples_are_lit_for_their_own_eye(shading):
     material = Material(0.1, 0.6, 0.7, 20.0, two_sided=True)
     lights = [PointLight((0.5, 1.0, 1.0), (0.9, 0.5, 0.1)), DirectionalLight((0.3, 0.1, -2), (0.2, 0.3, 0.4)),
-              DirectionalLight((0, 0, 1.0))]  # fmt: skip
+              DirectionalLight((1, 0, 0.2))]  # fmt: skip
     normals = np.array([(0.4, 0, 1), (-0.4, 0.2, 1), (0, 0.5, 1), (0, -0.5, 1.0)])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     kd = np.array([0.9, 0.5, 0.25])
