@@ -108,4 +108,5 @@ def check_image(name: str, image: object) -> NDArray[np.uint8]:
         a = np.floor(np.clip(a, 0.0, 1.0) * 255.0 + 0.5)
     elif a.dtype != np.uint8:
         raise InputError(f"{name}: expected uint8 or float in 0…1, got {a.dtype}")
-    return np.ascontiguousarray(a[..., :3], dtype=np.uint8)
+    # an array that fits is kept as it is, so that objects can share one texture
+    return np.ascontiguousarray(a if a.shape[2] == 3 else a[..., :3], dtype=np.uint8)

@@ -52,6 +52,43 @@ def _faces(value: ArrayLike, count: int) -> NDArray[np.int32]:
     return np.ascontiguousarray(raw, dtype=np.int32)
 
 
+def merge_positions(points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Group points (N, 3) of equal position, −0 and 0 being equal.
+
+    Returns
+    -------
+    first : ndarray of shape (M,)
+        Index of one point of each group.
+    group : ndarray of shape (N,)
+        Group of every point.
+    """
+    points = points + 0.0  # −0 becomes 0
+    bits = points.view(np.uint64)
+    key = np.zeros(len(points), dtype=np.uint64)
+    for column in bits.T:  # the mixing steps of SplitMix64 (Steele, Lea and Flood 2014)
+        key += column
+        key ^= key >> np.uint64(30)
+        key *= np.uint64(0xBF58476D1CE4E5B9)
+        key ^= key >> np.uint64(27)
+        key *= np.uint64(0x94D049BB133111EB)
+        key ^= key >> np.uint64(31)
+    _, first, group = np.unique(key, return_index=True, return_inverse=True)
+    group = group.reshape(-1)
+    if not np.array_equal(points[first[group]], points):  # two positions share a key
+        _, first, group = np.unique(points, axis=0, return_index=True, return_inverse=True)
+        group = group.reshape(-1)
+    return first, group
+
+
+def _unit_sums(index: NDArray[np.integer], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sum vectors (C, 3) by `index` (C,) and scale the sums (max + 1, 3) to unit length; rounding noise becomes 0."""
+    total = np.stack([np.bincount(index, weights=vectors[:, axis]) for axis in range(3)], axis=1)
+    scale = np.bincount(index, weights=np.abs(vectors).sum(axis=1))
+    length = np.linalg.norm(total, axis=1)
+    real = length > 1e-9 * scale
+    return np.where(real[:, None], total / np.where(real, length, 1.0)[:, None], 0.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """Triangles with shared vertices; counter-clockwise seen from the front.
@@ -80,14 +117,14 @@ class Mesh:
         A field does not have the shape, type or range above; the message names it.
     """
 
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int32]
-    normals: NDArray[np.float64] | None = None
-    colors: NDArray[np.float32] | None = None
-    uv: NDArray[np.float64] | None = None
-    texture: NDArray[np.uint8] | None = None
-    material: Material | None = None
-    transform: NDArray[np.float64] | None = None
+    vertices: NDArray  # float64 once constructed; so are normals, uv and transform
+    faces: NDArray  # int32
+    normals: NDArray | None = None
+    colors: NDArray | None = None  # (N, 3) float32, 0…1
+    uv: NDArray | None = None
+    texture: NDArray | None = None  # (h, w, 3) uint8, rows from the top
+    material: Material = None  # type: ignore[assignment]  # None becomes Material()
+    transform: NDArray = None  # type: ignore[assignment]  # None becomes the identity
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -123,39 +160,39 @@ class Mesh:
     @cached_property
     def _merged_faces(self) -> NDArray[np.int64]:
         """Faces (F, 3) over vertices merged by equal position."""
-        points = self.vertices + 0.0  # −0 and 0 are one position
-        bits = points.view(np.uint64)
-        mixed = bits * np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
-        key = mixed[:, 0] ^ np.roll(mixed, 1, axis=1)[:, 2] >> np.uint64(7) ^ mixed[:, 2] << np.uint64(3)
-        _, first, group = np.unique(key, return_index=True, return_inverse=True)
-        if not np.array_equal(points[first[group]], points):  # two positions shared a key
-            _, group = np.unique(points, axis=0, return_inverse=True)
-        return group.reshape(-1)[self.faces]
+        return merge_positions(self.vertices)[1][self.faces]
 
     @cached_property
     def shading_normals(self) -> NDArray[np.float64]:
-        """Unit normals (N, 3): those given, else angle-weighted over merged vertices (Thürmer and Wüthrich 1998)."""
+        """Unit normals (N, 3): those given, else angle-weighted over merged vertices (Thürmer and Wüthrich 1998).
+
+        A given normal of zero length is computed too. Where the faces around a position cancel (a leaf with a
+        front and a back), only those that share the vertex itself count.
+        """
         if self.normals is not None:
             length = np.linalg.norm(self.normals, axis=1, keepdims=True)
-            return self.normals / np.where(length > 0, length, 1.0)
-        merged = self._merged_faces
+            if (length > 0).all():
+                return self.normals / length
+            return np.where(length > 0, self.normals / np.where(length > 0, length, 1.0), self._smooth_normals)
+        return self._smooth_normals
+
+    @cached_property
+    def _smooth_normals(self) -> NDArray[np.float64]:
         corner = self.vertices[self.faces]  # (F, 3 corners, 3)
-        scale = np.abs(corner - corner[:, :1]).max(initial=0.0) or 1.0
-        edge = (np.roll(corner, -1, axis=1) - corner) / scale
-        normal = np.cross(edge[:, 0], edge[:, 1])
-        length = np.linalg.norm(normal, axis=1, keepdims=True)
-        normal /= np.where(length > 0, length, 1.0)
+        edge = np.roll(corner, -1, axis=1) - corner
+        edge /= np.abs(edge).max(initial=0.0) or 1.0
         incoming = -np.roll(edge, 1, axis=1)
-        angle = np.arctan2(
-            np.linalg.norm(np.cross(edge, incoming), axis=2), np.einsum("fkc,fkc->fk", edge, incoming)
-        )
-        total = np.zeros((int(merged.max()) + 1, 3))
-        for axis in range(3):
-            weight = (angle * normal[:, None, axis]).ravel()
-            total[:, axis] = np.bincount(merged.ravel(), weights=weight, minlength=len(total))
-        total /= np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
+        normal = np.cross(edge[:, 0], edge[:, 1])
+        double_area = np.linalg.norm(normal, axis=1)
+        angle = np.arctan2(double_area[:, None], np.einsum("fkc,fkc->fk", edge, incoming))
+        normal /= np.where(double_area > 0, double_area, 1.0)[:, None]
+        weighted = (angle[:, :, None] * normal[:, None, :]).reshape(-1, 3)
+        used = self.faces.ravel()
         result = np.zeros_like(self.vertices)
-        result[self.faces.ravel()] = total[merged.ravel()]
+        result[used] = _unit_sums(self._merged_faces.ravel(), weighted)[self._merged_faces.ravel()]
+        lost = ~result[used].any(axis=1)
+        if lost.any():
+            result[used[lost]] = _unit_sums(used, weighted)[used[lost]]
         return result
 
     @cached_property
@@ -176,5 +213,5 @@ class Mesh:
     @property
     def two_sided(self) -> bool:
         """Whether back sides are drawn: as the material says, else unless the surface is closed."""
-        chosen = self.material.two_sided if self.material is not None else None
+        chosen = self.material.two_sided
         return not self.is_closed if chosen is None else chosen

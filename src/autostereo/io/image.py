@@ -1,0 +1,66 @@
+"""Pictures: textures, quilts, panels."""
+
+from __future__ import annotations
+
+import io
+import threading
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileError
+from .files import PathLike, read_bytes
+
+MAX_PIXELS = 2**29  # twice the largest quilt, 16384²: 1.6 GB as RGB
+_PILLOW_LIMIT = threading.Lock()
+
+
+def read_image(path: PathLike, asked_by: PathLike | None = None) -> NDArray[np.uint8]:
+    """Read a picture as (H, W, 3) uint8, or (H, W, 4) where it has transparency; rows from the top.
+
+    `asked_by` is the file that refers to it, if any; an error names both.
+
+    Raises
+    ------
+    FileError
+        The file is missing, truncated, no picture, or larger than MAX_PIXELS.
+    """
+    return decode_image(read_bytes(path, asked_by), f"{path}" if asked_by is None else f"{asked_by}: texture {path}")
+
+
+def decode_image(data: bytes, name: str) -> NDArray[np.uint8]:
+    """Decode the bytes of a picture file, as `read_image`; `name` is what an error calls it."""
+    from PIL import Image
+
+    try:
+        with _PILLOW_LIMIT:
+            # Pillow refuses 179 Mpx while it opens a file, and a 16384² quilt has 268
+            limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
+            try:
+                image = Image.open(io.BytesIO(data))
+            finally:
+                Image.MAX_IMAGE_PIXELS = limit
+    except Exception as error:
+        raise FileError(f"{name}: is not a picture that can be read (PNG, JPEG, WebP, TIFF, BMP, …)") from error
+    width, height = image.size
+    if width * height > MAX_PIXELS:
+        raise FileError(f"{name}: a picture of {width}×{height} pixels is too large, the limit is {MAX_PIXELS}")
+    try:
+        return _as_rgb(image)
+    except MemoryError:
+        raise FileError(f"{name}: not enough memory for {width}×{height} pixels") from None
+    except Exception as error:  # decoders raise OSError, SyntaxError, ValueError, struct.error, zlib.error …
+        raise FileError(f"{name}: the picture is damaged or truncated ({error})") from error
+
+
+def _as_rgb(image: Any) -> NDArray[np.uint8]:
+    """Pixels of a PIL image as (H, W, 3|4) uint8."""
+    if image.mode.startswith("I;16"):
+        grey = np.asarray(image).astype(np.uint16)
+        return np.repeat(((grey.astype(np.uint32) + 128) // 257).astype(np.uint8)[..., None], 3, axis=2)
+    if image.mode in ("I", "F"):
+        raise ValueError(f"pixels of type {image.mode} have no fixed range")
+    see_through = image.mode in ("RGBA", "LA", "PA", "RGBa", "La") or "transparency" in image.info
+    mode = "RGBA" if see_through else "RGB"
+    return np.ascontiguousarray(np.asarray(image if image.mode == mode else image.convert(mode)))
