@@ -1,0 +1,1 @@
+"""The mesh benchmark: contenders of one job, measured in turns in one process."""

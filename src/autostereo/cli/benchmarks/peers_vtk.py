@@ -1,0 +1,213 @@
+"""Peer B: a VTK loop that renders the V views one after another, headless through EGL, in three variants.
+
+``tuned``
+    As far as VTK lets one go: no multisampling, no blit to a second framebuffer, no cullers, no coincident-topology
+    pass, static pipeline, back-face culling where the mesh is closed, one render and one RGBA read-back into a
+    kept array a view.
+``plain``
+    What a careful user writes: VTK's defaults without multisampling, one render and one vtkWindowToImageFilter a view.
+``prelit``
+    ``tuned``, but vertices are lit before the measurement and drawn with lighting off: for vertex-lit surfaces the
+    least work that yields the picture. (VTK itself lights every fragment of a mesh that has normals, whatever
+    SetInterpolation says.)
+
+All use an explicit off-axis projection for each camera. VTK's highlight is Phong's (reflected ray), not Blinn's.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...display.rig import Rig
+from ...errors import DependencyError
+from ...scene.appearance import Material
+from ...scene.scene import Scene
+from .workloads import Size, clip_from_centre, eyes, world_arrays
+
+
+def create_window() -> Any:
+    """Headless window that every loop shares: finalising one would end the display of other EGL contexts too.
+
+    Raises
+    ------
+    DependencyError
+        VTK or a headless OpenGL through EGL is missing.
+    """
+    try:
+        from vtkmodules.vtkRenderingOpenGL2 import vtkEGLRenderWindow
+    except ImportError:
+        raise DependencyError("VTK with EGL is not installed (pip install autostereo[bench])") from None
+    window = vtkEGLRenderWindow()
+    window.SetOffScreenRendering(True)
+    window.SetShowWindow(False)
+    window.SetMultiSamples(0)
+    window.SwapBuffersOff()
+    if not window.SupportsOpenGL():
+        raise DependencyError("VTK finds no headless OpenGL through EGL")
+    return window
+
+
+class VTKLoop:
+    """V passes over one mesh.
+
+    Parameters
+    ----------
+    window : vtkEGLRenderWindow
+        From `create_window`.
+    scene : Scene
+        One mesh, no texture, the default light.
+    rig : Rig
+    size : (int, int)
+        Width and height of one view in pixels.
+    variant : {"tuned", "plain", "prelit"}
+    """
+
+    def __init__(self, window: Any, scene: Scene, rig: Rig, size: Size, variant: str = "tuned") -> None:
+        from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
+        from vtkmodules.vtkCommonMath import vtkMatrix4x4
+        from vtkmodules.vtkRenderingCore import vtkRenderer, vtkWindowToImageFilter
+
+        forward = rig.eye_from_world[2, :3]
+        self._size = size
+        self._plain = variant == "plain"
+        self._pixels = vtkUnsignedCharArray()
+        self._renderer = renderer = vtkRenderer()
+        renderer.SetBackground(*scene.background)
+        if not self._plain:
+            renderer.GetCullers().RemoveAllItems()
+        renderer.SetAutomaticLightCreation(False)
+        renderer.AddLight(_light(forward))
+        renderer.AddActor(_actor(scene, variant, -forward))
+        self._window = window
+        self._filter = vtkWindowToImageFilter()
+        self._filter.SetInput(window)
+        self._filter.ReadFrontBufferOff()
+        self._filter.ShouldRerenderOff()
+        self._camera = camera = renderer.GetActiveCamera()
+        camera.SetViewUp(*rig.up)
+        camera.SetClippingRange(rig.near_depth, 1e4 * rig.near_depth)
+        camera.SetUseExplicitProjectionTransformMatrix(True)
+        self._eyes = eyes(rig)
+        self._targets = self._eyes + forward * rig.focal
+        self._projections = []
+        for clip, offset in zip(clip_from_centre(rig, size), rig.camera_offsets, strict=True):
+            clip[:, 3] += clip[:, 0] * offset + clip[:, 1] * rig.offset_y  # from this camera, not the centre one
+            clip[:, 2] *= -1  # VTK's camera looks along −z
+            matrix = vtkMatrix4x4()
+            matrix.DeepCopy(clip.ravel().tolist())
+            self._projections.append(matrix)
+
+    def enter(self) -> None:
+        """Make the window's context current and this loop its content."""
+        window = self._window
+        window.MakeCurrent()
+        if not window.HasRenderer(self._renderer):
+            for other in list(window.GetRenderers()):
+                window.RemoveRenderer(other)
+            if self._plain:
+                window.SetFrameBlitModeToBlitToHardware()
+            else:
+                window.SetFrameBlitModeToNoBlit()
+            window.SetSize(*self._size)
+            window.AddRenderer(self._renderer)
+
+    def frame(self) -> None:
+        """Draw and read back every view once."""
+        for view in range(len(self._projections)):
+            self._draw(view)
+
+    def finish(self) -> None:
+        """Nothing is left to wait for: every view was read back."""
+
+    def _draw(self, view: int) -> None:
+        camera = self._camera
+        camera.SetPosition(self._eyes[view])
+        camera.SetFocalPoint(self._targets[view])
+        camera.SetExplicitProjectionTransformMatrix(self._projections[view])
+        self._window.Render()
+        if self._plain:
+            self._filter.Modified()
+            self._filter.Update()
+            return
+        width, height = self._size
+        self._window.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, self._pixels)
+
+    def picture(self, view: int) -> NDArray[np.uint8]:
+        """Draw one view, (H, W, 3) uint8, rows from the top. For checks, not for timing."""
+        from vtkmodules.util.numpy_support import vtk_to_numpy
+
+        self.enter()
+        self._draw(view)
+        data = self._filter.GetOutput().GetPointData().GetScalars() if self._plain else self._pixels
+        pixels = vtk_to_numpy(data).reshape(self._size[1], self._size[0], -1)
+        return pixels[::-1, :, :3].copy()
+
+    def release(self) -> None:
+        """Free the buffers of this loop; the window stays."""
+        self._window.MakeCurrent()
+        self._renderer.ReleaseGraphicsResources(self._window)
+        self._window.RemoveRenderer(self._renderer)
+
+
+def _light(forward: NDArray[np.float64]) -> Any:
+    """White directional light that travels along `forward` (3,)."""
+    from vtkmodules.vtkRenderingCore import vtkLight
+
+    light = vtkLight()
+    light.SetLightTypeToSceneLight()
+    light.SetPositional(False)
+    light.SetPosition(*(-forward))
+    light.SetFocalPoint(0.0, 0.0, 0.0)
+    return light
+
+
+def _actor(scene: Scene, variant: str, to_light: NDArray[np.float64]) -> Any:
+    from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
+
+    (mesh,) = scene.objects
+    material = mesh.material or Material()
+    mapper = vtkPolyDataMapper()
+    mapper.SetInputData(_polydata(scene, variant, to_light))
+    actor = vtkActor()
+    actor.SetMapper(mapper)
+    surface = actor.GetProperty()
+    surface.SetInterpolationToPhong()
+    surface.SetAmbient(material.ambient)
+    surface.SetDiffuse(material.diffuse)
+    surface.SetSpecular(material.specular)
+    surface.SetSpecularPower(material.shininess)
+    if variant != "plain":
+        mapper.SetResolveCoincidentTopologyToOff()
+        mapper.StaticOn()
+        actor.ForceOpaqueOn()
+        surface.SetBackfaceCulling(not mesh.two_sided)
+    if variant == "prelit":
+        surface.LightingOff()
+    return actor
+
+
+def _polydata(scene: Scene, variant: str, to_light: NDArray[np.float64]) -> Any:
+    """Triangles with normals and colours, or with lit colours and no normals."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+
+    (mesh,) = scene.objects
+    positions, normals, colors = world_arrays(scene)
+    data = vtkPolyData()
+    points, triangles = vtkPoints(), vtkCellArray()
+    points.SetData(numpy_to_vtk(positions.astype(np.float32), deep=True))
+    triangles.SetData(3, numpy_to_vtk(np.ascontiguousarray(mesh.faces.ravel(), dtype=np.int32), deep=True))
+    data.SetPoints(points)
+    data.SetPolys(triangles)
+    if variant == "prelit":
+        material, facing = mesh.material or Material(), np.maximum(normals @ to_light, 0.0)[:, None]
+        colors = np.clip(colors * (material.ambient + material.diffuse * facing), 0.0, 1.0)
+    else:
+        data.GetPointData().SetNormals(numpy_to_vtk(normals.astype(np.float32), deep=True))
+    rgb = np.floor(255 * colors + 0.5).astype(np.uint8)
+    data.GetPointData().SetScalars(numpy_to_vtk(np.ascontiguousarray(rgb), deep=True))
+    return data
