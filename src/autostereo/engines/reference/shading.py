@@ -77,23 +77,22 @@ def shade(
     corner = surface.faces[hits.triangle]
     front = (hits.side < 0) if surface.mirrored else (hits.side > 0)
     sign = np.where(front, 1.0, -1.0)[:, None]
+    centre = np.array([0.0, camera.offset_y, 0.0])
 
     def mix(per_vertex: Array) -> Array:
         return np.einsum("mk,mkc->mc", hits.weights, per_vertex[corner])
 
     if options.lighting == "vertex":
         # lit for the centre eye, both sides; what is interpolated includes the vertex colour
-        centre = np.zeros_like(surface.vertices)
-        sides = [
-            illuminate(surface.vertices, s * surface.normals, centre, surface.material, lights) for s in (1.0, -1.0)
-        ]
+        eyes = np.broadcast_to(centre, surface.vertices.shape)
+        sides = [illuminate(surface.vertices, s * surface.normals, eyes, surface.material, lights) for s in (1.0, -1.0)]
         (front_light, front_highlight), (back_light, back_highlight) = sides
         color = np.where(front[:, None], mix(surface.colors * front_light), mix(surface.colors * back_light))
         highlight = np.where(front[:, None], mix(front_highlight), mix(back_highlight))
     else:
-        eyes = np.zeros((len(sign), 3))
+        eyes = np.tile(centre, (len(sign), 1))
         if options.shading != "center":
-            eyes[:, 0], eyes[:, 1] = samples.v[hits.where], camera.offset_y
+            eyes[:, 0] = samples.v[hits.where]
         normals = sign * unit(mix(surface.normals))
         reflected, highlight = illuminate(mix(surface.vertices), normals, eyes, surface.material, lights)
         color = mix(surface.colors) * reflected
