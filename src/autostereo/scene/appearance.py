@@ -25,7 +25,7 @@ def check_vector(name: str, value: object) -> Vector:
 
 def check_number(name: str, value: object, low: float = -np.inf, high: float = np.inf) -> float:
     """Return a finite number within [low, high], or raise an error that names the field."""
-    if isinstance(value, (bool, str)) or not np.isscalar(value):
+    if isinstance(value, (bool, str, bytes, complex)) or not np.isscalar(value):
         raise InputError(f"{name}: expected a number, got {value!r}")
     number = float(value)  # type: ignore[arg-type]
     if not np.isfinite(number) or not low <= number <= high:

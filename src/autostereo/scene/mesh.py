@@ -30,9 +30,8 @@ def _floats(name: str, value: ArrayLike, columns: tuple[int, ...], count: int | 
 
 def _colors(value: ArrayLike, count: int) -> NDArray[np.float32]:
     """Return colours as (N, 3) float32 in 0…1; integers count as 0…255, alpha is ignored."""
-    raw = np.asarray(value)
     a = _floats("colors", value, (3, 4), count)[:, :3]
-    if np.issubdtype(raw.dtype, np.integer):
+    if np.issubdtype(np.asarray(value).dtype, np.integer):
         a = a / 255.0
     if a.size and (a.min() < 0 or a.max() > 1):
         raise InputError(f"colors: expected 0…1 (float) or 0…255 (uint8), found {a.min():g}…{a.max():g}")
@@ -40,7 +39,10 @@ def _colors(value: ArrayLike, count: int) -> NDArray[np.float32]:
 
 
 def _faces(value: ArrayLike, count: int) -> NDArray[np.int32]:
-    raw = np.asarray(value)
+    try:
+        raw = np.asarray(value)
+    except (TypeError, ValueError):
+        raise InputError(f"faces: expected an array of integers, got {type(value).__name__} of uneven rows") from None
     if raw.ndim != 2 or raw.shape[1] != 3:
         raise InputError(f"faces: expected shape (F, 3), got {raw.shape}")
     if len(raw) == 0:
@@ -49,7 +51,7 @@ def _faces(value: ArrayLike, count: int) -> NDArray[np.int32]:
         raise InputError(f"faces: expected integers, got {raw.dtype}")
     if raw.min() < 0 or raw.max() >= count:
         raise InputError(f"faces: expected indices 0…{count - 1}, found {raw.min()}…{raw.max()}")
-    return np.ascontiguousarray(raw, dtype=np.int32)
+    return np.array(raw, dtype=np.int32, order="C")
 
 
 def merge_positions(points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -106,7 +108,7 @@ class Mesh:
     uv : array_like of shape (N, 2), optional
         Texture coordinates, (0, 0) the bottom left of the texture; they repeat.
     texture : image of shape (h, w, 3 or 4), optional
-        uint8 or float 0…1, or a PIL image; needs `uv`.
+        uint8 or float 0…1, or a PIL image; needs `uv`. A uint8 RGB array is not copied: objects can share it.
     material : Material, optional
     transform : array_like of shape (4, 4), optional
         world_from_object.

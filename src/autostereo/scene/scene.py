@@ -47,7 +47,10 @@ class Scene:
                 raise InputError(f"objects: expected {names}, got {type(item).__name__}")
         object.__setattr__(self, "objects", objects)
         if self.lights is not None:
-            lights = (self.lights,) if isinstance(self.lights, (DirectionalLight, PointLight)) else tuple(self.lights)
+            lights = (self.lights,) if isinstance(self.lights, (DirectionalLight, PointLight)) else self.lights
+            if not isinstance(lights, Iterable):
+                raise InputError(f"lights: expected lights, got {type(lights).__name__}")
+            lights = tuple(lights)
             for light in lights:
                 if not isinstance(light, (DirectionalLight, PointLight)):
                     raise InputError(f"lights: expected lights, got {type(light).__name__}")
