@@ -1,0 +1,283 @@
+"""What the verbs share: options, reading of sizes and displays, output checks, messages, progress."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..errors import FileError, InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ..display.display import Display
+    from ..display.rig import Rig
+    from ..scene.scene import Scene
+
+MAX_SIDE = 65_535  # of a picture; the largest that common formats can hold
+MAX_VIEWS = 65_535
+
+
+class State:
+    """Settings of the running command."""
+
+    quiet = False
+
+
+STATE = State()
+
+
+def _set_quiet(value: bool) -> bool:
+    STATE.quiet = value
+    return value
+
+
+# --- options, in the words of the help -----------------------------------------------------------------------------
+Inputs = Annotated[list[Path], typer.Argument(metavar="IN...", help="Scene files; several are merged.")]
+Output = Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="Output file.")]
+DisplayName = Annotated[
+    str, typer.Option("--display", "-d", metavar="NAME", help="Preset name, visual.json, or your own .toml.")
+]
+OptionalDisplayName = Annotated[
+    str | None, typer.Option("--display", "-d", metavar="NAME", help="Preset name, visual.json, or your own .toml.")
+]
+Size = Annotated[str | None, typer.Option("--size", metavar="WxH", help="Size in pixels.")]
+Swap = Annotated[bool, typer.Option("--swap", help="Reverse the order of the views (if depth looks inside out).")]
+Camera = Annotated[
+    Path | None, typer.Option("--camera", metavar="RIG.json", help="Cameras; without it the scene is framed.")
+]
+ViewCount = Annotated[int | None, typer.Option("--views", "-n", metavar="V", help="Number of views.")]
+Continuous = Annotated[
+    bool, typer.Option("--continuous", help="Give every sub-pixel its exact angle, not one of V views.")
+]
+Background = Annotated[
+    str | None, typer.Option("--background", metavar="COLOR", help="#rrggbb, R,G,B in 0…1, black, grey or white.")
+]
+Method = Annotated[str, typer.Option("--method", help="single-pass, n-pass or n-pass-subres.")]
+EngineName = Annotated[str, typer.Option("--engine", help="auto, cpu or reference.")]
+Shading = Annotated[str, typer.Option("--shading", help="exact, center or reuse.")]
+Lighting = Annotated[str, typer.Option("--lighting", help="sample or vertex.")]
+Sampling = Annotated[str, typer.Option("--sampling", help="pixel or subpixel.")]
+Samples = Annotated[int, typer.Option("--samples", help="Samples per pixel: 1, 4, 16 or 64.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", callback=_set_quiet, help="Say nothing but errors.")]
+
+
+# --- reading of values ---------------------------------------------------------------------------------------------
+def parse_pair(text: str, name: str, high: int) -> tuple[int, int]:
+    """Read "AxB" as two whole numbers in 1…high."""
+    parts = text.lower().replace("×", "x").split("x")
+    if len(parts) != 2 or not all(part.strip().isascii() and part.strip().isdigit() for part in parts):
+        raise InputError(f"{name}: expected two whole numbers such as 420x560, got {text!r}")
+    first, second = (int(part) for part in parts)
+    if not (1 <= first <= high and 1 <= second <= high):
+        raise InputError(f"{name}: expected numbers from 1 to {high}, got {text}")
+    return first, second
+
+
+def parse_size(text: str, name: str = "--size") -> tuple[int, int]:
+    """Read "WxH" in pixels."""
+    return parse_pair(text, name, MAX_SIDE)
+
+
+def parse_numbers(text: str, name: str, count: int) -> tuple[float, ...]:
+    """Read `count` finite numbers separated by commas."""
+    try:
+        numbers = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != count or not all(abs(number) < float("inf") for number in numbers):
+        raise InputError(f"{name}: expected {count} numbers separated by commas, got {text!r}")
+    return numbers
+
+
+def parse_color(text: str, name: str = "--background") -> tuple[float, float, float]:
+    """Read "#rrggbb", "R,G,B" in 0…1, or a name."""
+    names = {"black": (0.0, 0.0, 0.0), "grey": (0.5, 0.5, 0.5), "gray": (0.5, 0.5, 0.5), "white": (1.0, 1.0, 1.0)}
+    if text.lower() in names:
+        return names[text.lower()]
+    if text.startswith("#") and len(text) == 7:
+        try:
+            value = int(text[1:], 16)
+        except ValueError:
+            raise InputError(f"{name}: expected #rrggbb, got {text!r}") from None
+        return (value >> 16) / 255, (value >> 8 & 255) / 255, (value & 255) / 255
+    red, green, blue = parse_numbers(text, name, 3)
+    if min(red, green, blue) < 0 or max(red, green, blue) > 1:
+        raise InputError(f"{name}: expected values 0…1, got {text!r}")
+    return red, green, blue
+
+
+def check_views(views: int | None) -> None:
+    """Refuse a view count that is no count."""
+    if views is not None and not 1 <= views <= MAX_VIEWS:
+        raise InputError(f"--views: expected a number from 1 to {MAX_VIEWS}, got {views}")
+
+
+# --- output --------------------------------------------------------------------------------------------------------
+def check_output(path: Path, suffixes: tuple[str, ...] = ()) -> Path:
+    """Refuse, before the long work, a path that could not be written after it."""
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise InputError(f"{path}: expected a name ending in {' '.join(suffixes)}, got {path.suffix or 'no suffix'}")
+    if path.is_dir() and suffixes:
+        raise FileError(f"{path}: expected a file name, found a folder")
+    folder = path.parent
+    if not folder.is_dir():
+        raise FileError(f"{path}: the folder {folder} does not exist")
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise FileError(f"{path}: the folder {folder} is not writable ({error.strerror or error})") from error
+    return path
+
+
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """Give a temporary folder to fill; when all went well its files appear in `path`, else nothing does.
+
+    In a folder that exists, files of the same name are replaced.
+    """
+    if path.exists() and not path.is_dir():
+        raise FileError(f"{path}: expected a folder, found a file")
+    check_output(path)
+    temporary = path.parent / f".{path.name}.{secrets.token_hex(4)}.part"
+    try:
+        temporary.mkdir()
+        yield temporary
+        if path.is_dir():
+            for item in temporary.iterdir():
+                os.replace(item, path / item.name)
+        else:
+            os.replace(temporary, path)
+    except OSError as error:
+        if isinstance(error, FileError):
+            raise
+        raise FileError(f"{path}: cannot be written ({error.strerror or error})") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+# --- messages ------------------------------------------------------------------------------------------------------
+def say(text: str) -> None:
+    """Print a result to stdout unless --quiet."""
+    if not STATE.quiet:
+        print(text)
+
+
+def note(text: str) -> None:
+    """Print a remark to stderr unless --quiet."""
+    if not STATE.quiet:
+        print(text, file=sys.stderr, flush=True)
+
+
+@contextmanager
+def working(text: str, total: int | None = None) -> Iterator[Callable[[], None]]:
+    """Show a spinner, or a bar over `total` steps, while the block runs; gives a function that counts a step.
+
+    Only on a terminal; nothing in a pipe or with --quiet.
+    """
+    if STATE.quiet or not sys.stderr.isatty():
+        yield lambda: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = [SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()]
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task(text, total=total)
+        yield lambda: progress.advance(task)
+
+
+def announce_compilation(engine: str) -> None:
+    """Say so when this is the run that compiles the kernels."""
+    if engine not in ("auto", "cpu"):
+        return
+    from ..engines.cpu import engine as cpu
+
+    is_compiled = getattr(cpu, "is_compiled", None)
+    if is_compiled is not None and not is_compiled():
+        note("compiling kernels (once, up to a minute)…")
+
+
+# --- what the verbs work on ----------------------------------------------------------------------------------------
+def load_display(
+    name: str, size: str | None = None, swap: bool = False, views: int | None = None, continuous: bool = False
+) -> Display:
+    """Return the display called `name` (preset, visual.json or .toml) with the changes that the options ask for."""
+    from dataclasses import replace
+
+    from ..display.display import Display
+
+    check_views(views)
+    display = Display.preset(name, reverse=swap)
+    if size is not None:
+        display = display.resized(*parse_size(size))
+    if views is not None:
+        display = display.with_views(views)
+    if continuous:
+        if display.viewmap is None:
+            raise InputError(f"--continuous: {display.name} is not interlaced, it has {display.views} fixed views")
+        display = replace(display, viewmap=replace(display.viewmap, continuous=True))
+    return display
+
+
+def slug(name: str) -> str:
+    """Return the display's name as part of a file name."""
+    return Path(name).stem if name.endswith((".json", ".toml")) else name
+
+
+def load_camera(path: Path | None) -> Rig | None:
+    """Read a rig file; None stays None."""
+    if path is None:
+        return None
+    from ..display.rig import Rig
+
+    return Rig.load(path)
+
+
+def load_scene(paths: list[Path], background: str | None) -> Scene:
+    """Read scene files into one scene."""
+    from dataclasses import replace
+
+    color = parse_color(background) if background is not None else None
+    for path in paths:
+        if not path.exists():
+            raise FileError(f"{path}: no such file")
+    with working("reading"):
+        from ..io import load
+
+        scene = load(*paths)
+    return scene if color is None else replace(scene, background=color)
+
+
+def frame_views(
+    scene: Scene, rig: Rig | None, views: int | None, size: tuple[int, int], display: str | None
+) -> Rig:
+    """Return the cameras for a stack of views: `rig`, or ones that frame the scene; `views` of them."""
+    from ..display.display import Display
+    from ..display.rig import Rig as RigClass
+
+    if rig is not None:
+        return rig if views is None else rig.with_views(views)
+    if display is not None:
+        where = Display.preset(display)
+        return RigClass.frame(scene, where if views is None else where.with_views(views))
+    return RigClass.frame(scene, Display.lenticular(*size, 8 if views is None else views))
+
+
+def load_picture(path: Path, alpha: bool = False) -> NDArray[np.uint8]:
+    """Read a picture as (H, W, 3) uint8, or with `alpha` (H, W, 3 or 4)."""
+    from ..io.image import read_image
+
+    pixels = read_image(path)
+    return pixels if alpha else pixels[..., :3].copy()

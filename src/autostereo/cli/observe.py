@@ -1,0 +1,57 @@
+"""autostereo observe: what an eye in front of a panel sees."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import InputError
+from ..image import IMAGE_SUFFIXES
+from . import common
+from .common import say
+
+
+def observe(
+    panel: Annotated[Path, typer.Argument(metavar="PANEL", help="An interlaced picture.")],
+    display: common.DisplayName,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="Output file.")],
+    view: Annotated[
+        float | None, typer.Option("--view", metavar="U", help="Zone the eye is in: 0 leftmost, 3.5 between 3 and 4.")
+    ] = None,
+    eye: Annotated[
+        str | None, typer.Option("--eye", metavar="X,Z", help="Or its place: mm to the right, mm in front.")
+    ] = None,
+    crosstalk: Annotated[float, typer.Option("--crosstalk", help="Share of light from neighbours, 0…1.")] = 0.0,
+    swap: common.Swap = False,
+    views: common.ViewCount = None,
+    continuous: common.Continuous = False,
+    quiet: common.Quiet = False,
+) -> None:
+    """Compute what an eye in front of a panel sees.
+
+    The display's optics choose one sub-pixel for each place, colour and lens. Name the display that the picture was
+    made for, with the same --views, --swap and --continuous.
+
+    Examples:
+      autostereo observe panel.png -d looking-glass-portrait --view 20 -o left.png
+      autostereo observe panel.png -d looking-glass-portrait --eye -32,500 --crosstalk 0.1 -o left.png
+    """
+    if (view is None) == (eye is None):
+        raise InputError("observe: expected either --view U or --eye X,Z")
+    place = None if eye is None else common.parse_numbers(eye, "--eye", 2)
+    common.check_output(output, IMAGE_SUFFIXES)
+    where = common.load_display(display, None, swap, views, continuous)
+    pixels = common.load_picture(panel)
+    width, height = where.picture_size
+    if pixels.shape[:2] != (height, width):
+        where = where.resized(pixels.shape[1], pixels.shape[0])
+    from ..frame import Panel
+    from ..image import write_image
+    from ..render import observe as look
+
+    with common.working("looking"):
+        seen = look(Panel(pixels), where, view=view, eye=place, crosstalk=crosstalk)
+        write_image(output, seen)
+    say(f"{output}  {seen.shape[1]}×{seen.shape[0]}")

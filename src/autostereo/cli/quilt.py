@@ -1,0 +1,104 @@
+"""autostereo quilt: a scene to a quilt."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..errors import InputError
+from ..image import IMAGE_SUFFIXES
+from . import common
+from .common import say
+
+if TYPE_CHECKING:
+    from ..display.display import Display
+    from ..display.quilt import Quilt
+    from ..display.rig import Rig
+    from ..scene.scene import Scene
+
+
+def quilt(
+    inputs: common.Inputs,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Output; _qs…x…a… is added to the name.")
+    ] = None,
+    display: common.OptionalDisplayName = None,
+    grid: Annotated[str | None, typer.Option("--grid", metavar="CxR", help="Tiles across and up.")] = None,
+    view_size: Annotated[str | None, typer.Option("--view-size", metavar="WxH", help="Size of a tile.")] = None,
+    aspect: Annotated[
+        float | None, typer.Option("--aspect", help="Width/height of the display, if a tile's is another.")
+    ] = None,
+    camera: common.Camera = None,
+    background: common.Background = None,
+    method: common.Method = "single-pass",
+    engine: common.EngineName = "auto",
+    shading: common.Shading = "exact",
+    lighting: common.Lighting = "sample",
+    samples: common.Samples = 1,
+    quiet: common.Quiet = False,
+) -> None:
+    """Render a quilt: all views tiled into one picture.
+
+    The leftmost view stands at the bottom left. The layout is the display's own, or --grid with --view-size; it
+    becomes part of the file's name.
+
+    Examples:
+      autostereo quilt bunny.ply --display looking-glass-portrait
+      autostereo quilt bunny.ply --grid 8x6 --view-size 420x560 -o out.png
+    """
+    from ..engines.options import Options
+
+    where = None if display is None else common.load_display(display)
+    layout = choose_layout(where, grid, view_size, aspect)
+    options = Options(shading=shading, lighting=lighting, samples=samples)
+    rig = common.load_camera(camera)
+    from ..encoders.quilt import quilt_path
+
+    path = common.check_output(quilt_path(output or Path(f"{inputs[0].stem}.png"), layout), IMAGE_SUFFIXES)
+    scene = common.load_scene(inputs, background)
+    rig = _frame(scene, where, layout) if rig is None else rig.with_views(layout.views)
+    if rig.aspect is None:
+        rig = replace(rig, aspect=layout.aspect)
+    from ..encoders.quilt import save_quilt
+    from ..render import render_views
+
+    common.announce_compilation(engine)
+    with common.working(f"rendering {rig.views} views"):
+        stack = render_views(scene, rig, layout.tile, method=method, engine=engine, options=options)
+    with common.working("writing"):
+        save_quilt(path, stack, layout)
+    say(f"{path}  {layout.width}×{layout.height}")
+
+
+def choose_layout(display: Display | None, grid: str | None, view_size: str | None, aspect: float | None) -> Quilt:
+    """Return the display's own quilt, with what the options change, or the one they describe."""
+    from ..display.quilt import Quilt
+
+    own = None if display is None else display.quilt
+    if own is None and (grid is None or view_size is None):
+        name = "without --display" if display is None else f"{display.name} has no quilt of its own"
+        raise InputError(f"quilt: {name}: expected --grid CxR and --view-size WxH")
+    if own is not None and grid is None and view_size is None:
+        return own if aspect is None else replace(own, aspect=aspect)
+    columns, rows = common.parse_pair(grid, "--grid", 1024) if grid else (own.columns, own.rows)  # type: ignore[union-attr]
+    width, height = common.parse_size(view_size, "--view-size") if view_size else own.tile  # type: ignore[union-attr]
+    if aspect is None:
+        aspect = width / height if display is None else display.aspect
+    return Quilt(columns, rows, columns * width, rows * height, aspect)
+
+
+def _frame(scene: Scene, display: Display | None, layout: Quilt) -> Rig:
+    """Cameras that frame the scene: for the display, or for a panel of the shape of a tile."""
+    from ..display.display import Display
+    from ..display.rig import Rig
+
+    fixed = display is None or display.viewmap is None or display.viewmap.table is not None
+    if display is None or (fixed and display.views != layout.views):
+        height = layout.tile[1]
+        display = Display.lenticular(max(1, round(height * layout.aspect)), height, layout.views)
+    elif display.views != layout.views:
+        display = display.with_views(layout.views)
+    return Rig.frame(scene, replace(display, quilt=layout))

@@ -1,0 +1,59 @@
+"""autostereo render: a scene to the interlaced picture of a display."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from time import perf_counter
+
+from ..image import IMAGE_SUFFIXES
+from . import common
+from .common import note, say
+
+
+def render(
+    inputs: common.Inputs,
+    display: common.DisplayName,
+    output: common.Output = None,
+    size: common.Size = None,
+    swap: common.Swap = False,
+    camera: common.Camera = None,
+    views: common.ViewCount = None,
+    continuous: common.Continuous = False,
+    background: common.Background = None,
+    method: common.Method = "single-pass",
+    engine: common.EngineName = "auto",
+    shading: common.Shading = "exact",
+    lighting: common.Lighting = "sample",
+    sampling: common.Sampling = "pixel",
+    samples: common.Samples = 1,
+    quiet: common.Quiet = False,
+) -> None:
+    """Render scene files to the interlaced picture of a display.
+
+    Without -o the picture is called after the first file and the display, in the current folder. Save panels as
+    png or webp: a lossy format would mix the views.
+
+    Examples:
+      autostereo render bunny.ply --display looking-glass-portrait
+      autostereo render room.glb lamp.glb -d visual.json -o room.png
+      autostereo render bunny.ply -d alioscopy-8 --swap --background white --samples 4
+      autostereo render bunny.ply -d my_panel.toml --size 3840x2160 --camera rig.json
+    """
+    from ..engines.options import Options
+
+    where = common.load_display(display, size, swap, views, continuous)
+    options = Options(shading=shading, lighting=lighting, sampling=sampling, samples=samples)
+    rig = common.load_camera(camera)
+    path = common.check_output(output or Path(f"{inputs[0].stem}_{common.slug(display)}.png"), IMAGE_SUFFIXES)
+    scene = common.load_scene(inputs, background)
+
+    from ..render import render as draw
+
+    common.announce_compilation(engine)
+    start = perf_counter()
+    with common.working("rendering"):
+        panel = draw(scene, where, rig, method=method, engine=engine, options=options)
+    note(f"rendered in {perf_counter() - start:.2f} s")
+    with common.working("writing"):
+        panel.save(path)
+    say(f"{path}  {panel.width}×{panel.height}")

@@ -1,0 +1,76 @@
+"""autostereo views: a scene to its views, as pictures, an animation or an array."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import InputError
+from . import common
+from .common import say
+
+ANIMATIONS = (".gif", ".webp", ".mp4")
+
+
+def views(
+    inputs: common.Inputs,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="OUT", help="Folder, or a .gif .webp .mp4 .npz file.")
+    ],
+    views: common.ViewCount = None,
+    size: common.Size = None,
+    display: common.OptionalDisplayName = None,
+    camera: common.Camera = None,
+    background: common.Background = None,
+    method: common.Method = "single-pass",
+    engine: common.EngineName = "auto",
+    shading: common.Shading = "exact",
+    lighting: common.Lighting = "sample",
+    samples: common.Samples = 1,
+    depth: Annotated[bool, typer.Option("--depth", help="Also keep eye depth (.npz only).")] = False,
+    quiet: common.Quiet = False,
+) -> None:
+    """Render the single views, from left to right.
+
+    A folder receives view_000.png, view_001.png, … and the cameras as rig.json; an animation swings through the
+    views and back. The cameras are those of --camera, or they frame the scene for --display (default: 8 views).
+
+    Examples:
+      autostereo views bunny.ply -o bunny/ --views 8 --size 512x512
+      autostereo views bunny.ply -o bunny.webp -d looking-glass-portrait --size 420x560
+      autostereo views bunny.ply -o bunny.npz --depth --camera rig.json
+    """
+    suffix = output.suffix.lower()
+    if suffix not in ("", ".npz", *ANIMATIONS):
+        raise InputError(f"{output}: expected a folder, or a name ending in .npz {' '.join(ANIMATIONS)}, got {suffix}")
+    if depth and suffix != ".npz":
+        raise InputError("--depth: only a .npz file can hold it")
+    from ..engines.options import Options
+
+    common.check_views(views)
+    options = Options(shading=shading, lighting=lighting, samples=samples, depth=depth)
+    rig = common.load_camera(camera)
+    shape = common.parse_size(size) if size else (512, 512)
+    common.check_output(output, (suffix,) if suffix else ())
+    scene = common.load_scene(inputs, background)
+    rig = common.frame_views(scene, rig, views, shape, display)
+
+    from ..render import render_views
+
+    common.announce_compilation(engine)
+    with common.working(f"rendering {rig.views} views"):
+        stack = render_views(scene, rig, shape, method=method, engine=engine, options=options)
+    with common.working("writing", None):
+        if suffix in ANIMATIONS:
+            from ..encoders.video import save_animation
+
+            save_animation(output, stack)
+        elif suffix:
+            stack.save(output)
+        else:
+            with common.whole_folder(output) as folder:
+                stack.save(folder)
+                rig.save(folder / "rig.json")
+    say(f"{output}  {rig.views} views of {shape[0]}×{shape[1]}")

@@ -1,0 +1,61 @@
+"""autostereo weave: a quilt to the interlaced picture of a display."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import InputError
+from ..image import IMAGE_SUFFIXES
+from . import common
+from .common import say
+
+
+def weave(
+    quilt: Annotated[Path, typer.Argument(metavar="QUILT", help="A quilt picture, as name_qs8x6a0.75.png.")],
+    display: common.DisplayName,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="Output file.")],
+    grid: Annotated[
+        str | None, typer.Option("--grid", metavar="CxR", help="Tiles across and up, if the name does not say.")
+    ] = None,
+    filter: Annotated[str, typer.Option("--filter", help="nearest or linear.")] = "nearest",
+    size: common.Size = None,
+    swap: common.Swap = False,
+    views: common.ViewCount = None,
+    continuous: common.Continuous = False,
+    quiet: common.Quiet = False,
+) -> None:
+    """Weave a quilt into the interlaced picture of a display.
+
+    The quilt's tiles are the views, bottom left first; their number becomes the display's unless its mask is a table.
+
+    Examples:
+      autostereo weave bunny_qs8x6a0.75.png -d looking-glass-portrait -o panel.png
+      autostereo weave picture.png --grid 5x9 -d visual.json --filter linear -o panel.png
+    """
+    from ..encoders.quilt import parse_quilt_name
+
+    named = parse_quilt_name(quilt)
+
+    if grid is not None:
+        columns, rows = common.parse_pair(grid, "--grid", 1024)
+    elif named is not None:
+        columns, rows = named.columns, named.rows
+    else:
+        raise InputError(f"{quilt}: the name does not say how many tiles (…_qs8x6a0.75.png); give --grid 8x6")
+    where = common.load_display(display, size, swap, None, continuous)
+    common.check_views(views)
+    if where.viewmap is None:
+        raise InputError(f"{where.name}: a {where.layout} picture is not woven from a quilt")
+    if where.viewmap.table is None:
+        where = where.with_views(columns * rows if views is None else views)
+    common.check_output(output, IMAGE_SUFFIXES)
+    pixels = common.load_picture(quilt, alpha=True)
+    from ..render import weave as draw
+
+    with common.working("weaving"):
+        panel = draw(pixels, (columns, rows), where, filter=filter)
+        panel.save(output)
+    say(f"{output}  {panel.width}×{panel.height}")
