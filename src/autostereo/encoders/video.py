@@ -1,0 +1,137 @@
+"""Looping animations of a view stack: the eye swings from the leftmost view to the rightmost and back."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import DependencyError, FileError, InputError, UnsupportedError
+from ..frame import ViewStack
+from ..image import write_atomic
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+ANIMATION_SUFFIXES = (".gif", ".webp", ".mp4")
+MAX_SIDE = {".gif": 65535, ".webp": 16383, ".mp4": 16384}
+H264_PIXELS, H264_SIDE = 4096 * 2304, 4096  # level 5.2, the last that common decoders take
+SWING_SECONDS = 3.0  # there and back, as far as 10…30 frames a second allow
+
+
+def sweep(views: int) -> list[int]:
+    """Order of the frames of one loop, 0 … V−1 … 1: repeated, each view's neighbours stay its neighbours."""
+    return [*range(views), *range(views - 2, 0, -1)]
+
+
+def save_animation(path: str | os.PathLike[str], views: ViewStack, fps: float | None = None) -> Path:
+    """Write a looping animation; the suffix chooses GIF, WebP or MP4.
+
+    GIF has one palette of 256 colours for all frames, so that colours do not flicker. MP4 is yuv420p with even sizes
+    (a last odd row or column is repeated), H.264, or H.265 above 4K; it holds one loop, which the player repeats.
+
+    Parameters
+    ----------
+    path : path
+    views : ViewStack
+    fps : float, optional
+        Frames a second, 0.1…100; None: a swing of three seconds, within 10…30. GIF times are multiples of 10 ms.
+
+    Raises
+    ------
+    InputError
+        Unknown suffix, a wrong `fps`, or pictures larger than the format allows.
+    FileError
+        The file cannot be written; nothing is left behind.
+    DependencyError
+        MP4 needs PyAV, `pip install autostereo[video]`.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in ANIMATION_SUFFIXES:
+        raise InputError(f"{path}: expected an animation ({' '.join(ANIMATION_SUFFIXES)}), got {path.suffix!r}")
+    order = sweep(views.views)
+    if fps is None:
+        fps = min(max(len(order) / SWING_SECONDS, 10.0), 30.0)
+    if not 0.1 <= fps <= 100:
+        raise InputError(f"fps: expected 0.1…100 frames a second, got {fps!r}")
+    if max(views.width, views.height) > MAX_SIDE[suffix]:
+        limit = MAX_SIDE[suffix]
+        raise InputError(f"{path}: {suffix} takes at most {limit} pixels a side, got {views.width}×{views.height}")
+    if suffix == ".mp4":
+        return _save_mp4(path, views, fps)
+    images = _gif_images(views) if suffix == ".gif" else _images(views)
+    frames = [images[k] for k in order]
+    options: dict[str, Any] = {"duration": round(1000 / fps), "loop": 0, "save_all": True, "append_images": frames[1:]}
+    if suffix == ".gif":
+        options |= {"duration": 10 * max(1, round(100 / fps)), "optimize": False, "disposal": 1}
+    else:
+        options |= {"quality": 90, "method": 2}
+    return write_atomic(path, lambda file: frames[0].save(file, format=suffix[1:], **options))
+
+
+def _images(views: ViewStack) -> list[Image.Image]:
+    from PIL import Image
+
+    return [Image.fromarray(np.ascontiguousarray(view[..., :3])) for view in views.color]
+
+
+def _gif_images(views: ViewStack) -> list[Image.Image]:
+    """The views in one palette, chosen from up to 16 of them, thinned."""
+    from PIL import Image
+
+    chosen = np.unique(np.linspace(0, views.views - 1, 16).astype(int))
+    step = max(1, math.isqrt(views.height * views.width // 2**16))
+    sample = np.concatenate(list(views.color[chosen, ::step, ::step, :3]))
+    palette = Image.fromarray(sample).quantize(256, method=Image.Quantize.MEDIANCUT)
+    return [image.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG) for image in _images(views)]
+
+
+def _save_mp4(path: Path, views: ViewStack, fps: float) -> Path:
+    try:
+        import av
+    except ImportError as error:
+        raise DependencyError(f"{path}: mp4 needs PyAV; pip install autostereo[video]") from error
+
+    try:
+        return write_atomic(path, lambda file: _encode(file, _even_frames(views), fps))
+    except av.error.FFmpegError as error:
+        raise FileError(f"{path}: cannot be written as mp4 ({error.strerror or error})") from error
+
+
+def _even_frames(views: ViewStack) -> Iterator[NDArray[np.uint8]]:
+    """Frames (H, W, 3) of one loop, with the last row and column repeated where H or W is odd."""
+    padding = ((0, views.height % 2), (0, views.width % 2), (0, 0))
+    for k in sweep(views.views):
+        yield np.ascontiguousarray(np.pad(views.color[k, ..., :3], padding, mode="edge"))
+
+
+def _encode(file: BinaryIO, frames: Iterator[NDArray[np.uint8]], fps: float) -> None:
+    """Write frames (H, W, 3) of even size as MP4, BT.709."""
+    import av
+
+    first = next(frames)
+    height, width = first.shape[:2]
+    large = height * width > H264_PIXELS or max(height, width) > H264_SIDE
+    codec = "libx265" if large else "libx264"
+    if codec not in av.codecs_available:
+        raise UnsupportedError(f"mp4: this PyAV lacks {codec}; its wheels from PyPI have it")
+    with av.open(file, mode="w", format="mp4") as container:
+        stream: Any = container.add_stream(codec, rate=Fraction(fps).limit_denominator(1001))
+        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+        stream.options = {"crf": "18"} | ({"x265-params": "log-level=error"} if large else {})
+        context = stream.codec_context
+        context.colorspace = context.color_primaries = context.color_trc = 1  # BT.709
+        context.color_range = 1  # 16…235, as yuv420p is understood
+        if large:
+            context.codec_tag = "hvc1"  # Apple's players know no other
+        for pixels in (first, *frames):
+            frame = av.VideoFrame.from_ndarray(pixels, format="rgb24")
+            container.mux(stream.encode(frame.reformat(format="yuv420p", dst_colorspace="ITU709")))
+        container.mux(stream.encode())
