@@ -139,10 +139,10 @@ def read_calibration(source: str | os.PathLike[str] | dict[str, Any]) -> Calibra
         raise FileError(f"{path}: cannot be read ({error.strerror or error})") from error
     except ValueError as error:  # a NUL in the name
         raise FileError(f"{str(path)!r}: cannot be read ({error})") from error
+    if len(raw) > MAX_BYTES:
+        raise FileError(f"{path}: expected a Looking Glass calibration, the file is larger than {MAX_BYTES} bytes")
     if not raw.strip():
         raise FileError(f"{path}: expected a Looking Glass calibration as JSON, the file is empty")
-    if len(raw) > MAX_BYTES:
-        raise FileError(f"{path}: expected a Looking Glass calibration as JSON, the file is larger than {MAX_BYTES} bytes")
     reader = _Reader(str(path), FileError)
     return reader.calibration(reader.parse(raw))
 
@@ -155,8 +155,9 @@ class _Reader:
         self.error = error
 
     def fail(self, field: str, expected: str, found: object) -> NoReturn:
-        text = repr(found)
-        raise self.error(f"{self.name}: {field}: expected {expected}, found {text if len(text) < 60 else text[:57] + '...'}")
+        text = "nothing" if found is None else repr(found)
+        text = text if len(text) <= 60 else text[:57] + "..."
+        raise self.error(f"{self.name}: {field}: expected {expected}, found {text}")
 
     def parse(self, raw: bytes | str) -> Any:
         try:

@@ -92,7 +92,8 @@ class Display:
         if self.layout not in LAYOUTS:
             raise InputError(f"layout: expected one of {', '.join(LAYOUTS)}, got {self.layout!r}")
         if (self.layout == "interlaced") != (self.viewmap is not None):
-            raise InputError(f"layout {self.layout}: {'a view map is missing' if self.viewmap is None else 'takes no view map'}")
+            problem = "a view map is missing" if self.viewmap is None else "takes no view map"
+            raise InputError(f"layout {self.layout}: {problem}")
         for name in ("eyes_swapped", "flip_x", "flip_y"):
             put(self, name, check_flag(name, getattr(self, name)))
         if self.viewmap is not None and self.eyes_swapped:
@@ -131,7 +132,7 @@ class Display:
 
     @property
     def aspect(self) -> float:
-        """Width/height of the window that every view shows: W/H, whatever the pixels of a view (square panel pixels)."""
+        """Width/height of the window that every view shows: W/H, as panel pixels are square."""
         return self.width / self.height
 
     @property
@@ -199,7 +200,7 @@ class Display:
         if views == self.views:
             return self
         if self.viewmap is None or self.viewmap.table is not None:
-            raise InputError(f"{self.name}: its {self.layout} layout fixes the number of views at {self.views}, not {views}")
+            raise InputError(f"views: {self.name} ({self.layout}) has {self.views} by its mask or layout, not {views}")
         quilt = self.quilt if self.quilt is not None and self.quilt.views == views else None
         return replace(self, viewmap=replace(self.viewmap, views=views), quilt=quilt)
 
@@ -306,7 +307,7 @@ class Display:
         Parameters
         ----------
         views : int, optional
-            V; None: the tiles of the device's own quilt or else of its model's (by serial number, else by panel), else 48.
+            V; None: as many as the device's own quilt has tiles, else its model's (by serial number or panel), else 48.
         reverse : bool
             Swap the zones against what the file's invView says.
         """
@@ -348,7 +349,10 @@ class Display:
 
     @staticmethod
     def rgbd(width: int, height: int, reverse: bool = False) -> Display:
-        """2D + depth in one `width` × `height` frame, each at half width (displays.md 3.6); `reverse` mirrors the depth."""
+        """Picture and depth in one `width` × `height` frame, each at half width (displays.md 3.6).
+
+        `reverse` inverts the depth.
+        ."""
         return replace(_packed("rgbd", "rgbd", (width, height), reverse), comfort=COMFORT, cone_deg=CONE_DEG)
 
 
@@ -359,7 +363,7 @@ def _pair_mm(value: Any) -> tuple[float, float]:
 
 
 def _two_view_comfort(width: Any) -> float:
-    """Two eyes fuse what adjacent views of a multi-view panel would show as a ghost: 2 % of the width (rule of thumb)."""
+    """2 % of the width, a rule of thumb: two eyes fuse what adjacent views of a multi-view panel show as a ghost."""
     return max(1.0, 0.02 * check_size("width", width))
 
 

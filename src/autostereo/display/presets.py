@@ -1,14 +1,15 @@
 """Displays by name: one TOML file each, built in or the user's own.
 
-A file holds `title`, `source`, `width`, `height`, a `[mask]` or a `[calibration]`, and, as it likes, `note`, `reverse`,
-`fov_y`, `comfort`, `serial` (start of the serial numbers of a model), `[quilt]` (columns, rows, width, height, aspect) and
-`[optics]` (size_mm, distance_mm, cone_deg). `[mask]` has a `kind` of MASKS and that constructor's arguments; `[calibration]`
-has the fields of a visual.json but its panel's size.
+A file holds `source`, `width`, `height`, a `[mask]` or a `[calibration]`, and, as it likes, `title`, `note`, `views`,
+`reverse`, `fov_y`, `comfort`, `serial` (start of a model's serial numbers), `[quilt]` (columns, rows, width, height,
+aspect) and `[optics]` (size_mm, distance_mm, cone_deg). `[mask]` has a `kind` of MASKS and that constructor's
+arguments; `[calibration]` has the fields of a visual.json but the panel's size.
 """
 
 from __future__ import annotations
 
 import difflib
+import inspect
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -138,17 +139,15 @@ def _build(where: str, name: str, fields: dict[str, Any]) -> Display:
     """Make the display of checked `fields`; errors name `where`."""
     try:
         width, height = check_size("width", fields["width"]), check_size("height", fields["height"])
-        quilt = Quilt(**fields["quilt"]) if "quilt" in fields else None
+        quilt = _call("quilt", Quilt, (), fields["quilt"]) if "quilt" in fields else None
         if "calibration" in fields:
             display = _calibrated(name, fields, (width, height), quilt)
         else:
             display = _from_mask(fields, width, height)
         changes: dict[str, Any] = {key: fields[key] for key in ("fov_y", "comfort", "note") if key in fields}
         display = replace(display, name=name, source=fields["source"], quilt=quilt, **changes)
-        display = display.physical(**fields.get("optics", {}))
+        display = _call("optics", display.physical, (), fields.get("optics", {}))
         return display.swapped() if masks.check_flag("reverse", fields.get("reverse", False)) else display
-    except TypeError as error:  # an argument the constructor does not have, or lacks
-        raise FileError(f"{where}: {error}") from error
     except AutostereoError as error:
         raise FileError(f"{where}: {error}") from error
 
@@ -166,7 +165,19 @@ def _from_mask(fields: dict[str, Any], width: int, height: int) -> Display:
         raise InputError(f"mask kind: expected one of {', '.join(MASKS)}, found {kind!r}")
     if "views" in fields:
         arguments["views"] = fields["views"]
-    return MASKS[kind](width, height, **arguments)
+    return _call("mask", MASKS[kind], (width, height), arguments)
+
+
+def _call(table: str, make: Callable[..., Any], given: tuple[Any, ...], fields: dict[str, Any]) -> Any:
+    """make(*given, **fields), where a field too many or too few is an error that names the table."""
+    parameters = list(inspect.signature(make).parameters.values())[len(given) :]
+    for key in fields:
+        if key not in [p.name for p in parameters]:
+            raise InputError(f"{table}: unknown field {key!r}; there are {', '.join(p.name for p in parameters)}")
+    for p in parameters:
+        if p.default is p.empty and p.name not in fields:
+            raise InputError(f"{table} {p.name}: missing")
+    return make(*given, **fields)
 
 
 def model_of(calibration: Calibration) -> Display | None:
@@ -175,8 +186,10 @@ def model_of(calibration: Calibration) -> Display | None:
     for name, fields in models.items():
         if calibration.serial.startswith(fields["serial"]):
             return load_preset(name)
-    for name, fields in models.items():
-        cells = bool(fields["calibration"].get("subpixelCells"))
-        if (fields["width"], fields["height"], cells) == (calibration.width, calibration.height, bool(calibration.cells)):
-            return load_preset(name)
-    return None
+    panel = (calibration.width, calibration.height, bool(calibration.cells))
+    alike = {
+        abs(fields["calibration"]["DPI"] - calibration.dpi): name
+        for name, fields in models.items()
+        if (fields["width"], fields["height"], bool(fields["calibration"].get("subpixelCells"))) == panel
+    }
+    return load_preset(alike[min(alike)]) if alike else None

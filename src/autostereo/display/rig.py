@@ -28,7 +28,8 @@ def _number(name: str, value: object, low: float, high: float, open_low: bool = 
         raise InputError(f"rig {name}: expected a number, got {value!r}")
     number = float(value)  # type: ignore[arg-type]
     if not np.isfinite(number) or not low <= number <= high or (open_low and number == low):
-        raise InputError(f"rig {name}: expected a number in {'(' if open_low else '['}{low:g}, {high:g}], got {value!r}")
+        bracket = "(" if open_low else "["
+        raise InputError(f"rig {name}: expected a number in {bracket}{low:g}, {high:g}], got {value!r}")
     return number
 
 
@@ -138,9 +139,9 @@ class Rig:
         i = np.arange(self.views)
         if self.spacing == "linear":
             return (i - (self.views - 1) / 2) * (self.baseline / (self.views - 1))
-        half = np.arctan(self.baseline / 2 / self.focal)
+        half = float(np.arctan(self.baseline / 2 / self.focal))
         step = i / (self.views - 1) if self.spacing == "equal-angle" else (i + 0.5) / self.views
-        return self.focal * np.tan((2 * step - 1) * half)
+        return np.asarray(self.focal * np.tan((2 * step - 1) * half), dtype=np.float64)
 
     def offset_at(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Camera offset at camera coordinates u: piecewise linear through the cameras, continued beyond the ends."""
@@ -155,7 +156,8 @@ class Rig:
         """The same rig with `views` cameras over its baseline; explicit offsets must already be that many."""
         if self.offsets is not None:
             if len(self.offsets) != views:
-                raise InputError(f"rig offsets: the display has {views} views, the rig gives {len(self.offsets)} offsets")
+                given = len(self.offsets)
+                raise InputError(f"rig offsets: the display has {views} views, the rig gives {given} offsets")
             return self
         return replace(self, views=views)
 
@@ -180,7 +182,7 @@ class Rig:
         """Read a JSON file of rig fields; unknown fields are errors."""
         path = Path(path)
         try:
-            fields = json.loads(path.read_text(encoding="utf-8"))
+            fields: Any = json.loads(path.read_text(encoding="utf-8"))
         except OSError as error:
             raise FileError(f"{path}: cannot be read ({error.strerror})") from error
         except (UnicodeDecodeError, json.JSONDecodeError) as error:
@@ -191,6 +193,7 @@ class Rig:
         if unknown:
             raise FileError(f"{path}: unknown rig fields {', '.join(sorted(unknown))}")
         try:
-            return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()})
+            checked: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()}
+            return cls(**checked)
         except InputError as error:
             raise FileError(f"{path}: {error}") from error
