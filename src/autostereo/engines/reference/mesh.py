@@ -191,6 +191,8 @@ def covers(side: int, e: Array, e_dx: Array, e_dy: Array) -> NDArray[np.bool_]:
 
 def clip_near(corners: Array, near: float) -> Array:
     """The part of a polygon (n, 3) in eye space with d ≥ near, shape (m, 3) (Sutherland and Hodgman 1974)."""
+    if (corners[:, 2] >= near).all():
+        return corners
     kept = []
     for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         if p[2] >= near:
