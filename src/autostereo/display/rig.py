@@ -136,7 +136,7 @@ class Rig:
             return np.array(self.offsets)
         if self.views == 1:
             return np.zeros(1)
-        i = np.arange(self.views)
+        i = np.arange(self.views, dtype=np.float64)
         if self.spacing == "linear":
             return (i - (self.views - 1) / 2) * (self.baseline / (self.views - 1))
         half = float(np.arctan(self.baseline / 2 / self.focal))
