@@ -1,1 +1,4 @@
-"""The mesh benchmark: contenders of one job, measured in turns in one process."""
+"""The mesh benchmark: contenders of one job, measured in turns in one process.
+
+`report.bench(BenchOptions(…), path)` measures, prints and saves; `mesh.run(BenchOptions(…))` only measures.
+"""

@@ -9,6 +9,7 @@ compiled in only if the material has one.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -101,8 +102,9 @@ void main() {
 """
 
 
-def create_context() -> Any:
-    """Standalone EGL context.
+@cache
+def shared_context() -> Any:
+    """Standalone EGL context, one per process: releasing one would end the EGL display of all others too.
 
     Raises
     ------

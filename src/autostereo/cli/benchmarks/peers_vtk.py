@@ -16,6 +16,9 @@ All use an explicit off-axis projection for each camera. VTK's highlight is Phon
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -27,9 +30,16 @@ from ...scene.appearance import Material
 from ...scene.scene import Scene
 from .workloads import Size, clip_from_centre, eyes, world_arrays
 
+# in a process of its own: SupportsOpenGL ends the EGL display in passing, and without a display VTK may crash
+_PROBE = """
+from vtkmodules.vtkRenderingOpenGL2 import vtkEGLRenderWindow
+raise SystemExit(0 if vtkEGLRenderWindow().SupportsOpenGL() else 1)
+"""
 
-def create_window() -> Any:
-    """Headless window that every loop shares: finalising one would end the display of other EGL contexts too.
+
+@cache
+def shared_window() -> Any:
+    """Headless window, one per process: finalising one would end the EGL display of all others too.
 
     Raises
     ------
@@ -40,13 +50,15 @@ def create_window() -> Any:
         from vtkmodules.vtkRenderingOpenGL2 import vtkEGLRenderWindow
     except ImportError:
         raise DependencyError("VTK with EGL is not installed (pip install autostereo[bench])") from None
+    probe = subprocess.run([sys.executable, "-c", _PROBE], capture_output=True, check=False)
+    if probe.returncode:
+        raise DependencyError("VTK finds no headless OpenGL through EGL")
     window = vtkEGLRenderWindow()
     window.SetOffScreenRendering(True)
     window.SetShowWindow(False)
     window.SetMultiSamples(0)
     window.SwapBuffersOff()
-    if not window.SupportsOpenGL():
-        raise DependencyError("VTK finds no headless OpenGL through EGL")
+    window.Initialize()
     return window
 
 
@@ -56,7 +68,7 @@ class VTKLoop:
     Parameters
     ----------
     window : vtkEGLRenderWindow
-        From `create_window`.
+        From `shared_window`.
     scene : Scene
         One mesh, no texture, the default light.
     rig : Rig

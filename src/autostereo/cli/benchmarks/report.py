@@ -1,0 +1,112 @@
+"""Showing and saving what the mesh benchmark measured."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from ...image import write_atomic
+from .contenders import BenchOptions
+
+Results = Sequence[dict[str, Any]]
+
+
+def bench(options: BenchOptions, path: Path | None = None, say: Callable[[str], object] = print) -> Results:
+    """Measure, print the tables and, if `path` is given, write everything as JSON.
+
+    Parameters
+    ----------
+    options : BenchOptions
+    path : Path, optional
+        Written when all is measured.
+    say : callable
+        Is told in one line what is being measured and what is left out.
+    """
+    from . import mesh
+
+    facts = mesh.facts(options)
+    results = mesh.run(options, say)
+    show(results, facts)
+    if path is not None:
+        save(path, results, facts)
+    return results
+
+
+def show(results: Results, facts: dict[str, Any]) -> None:
+    """Print the machine, a table of figures with their bars, and a table of times."""
+    from rich.console import Console
+
+    console = Console()
+    if not console.is_terminal:
+        console.width = max(console.width, 150)  # a pipe has no width: do not cut the tables to 80 columns
+    for line in describe(facts):
+        console.print(line, highlight=False)
+    console.print(_figures(results))
+    console.print(_times(results))
+    asked = [figure for figure in results if figure["met"] is not None]
+    console.print(f"{sum(figure['met'] for figure in asked)} of {len(asked)} bars met", highlight=False)
+
+
+def describe(facts: dict[str, Any]) -> list[str]:
+    """The machine facts as lines."""
+    versions = ", ".join(f"{name} {number}" for name, number in facts["versions"].items() if number)
+    lines = [
+        f"{facts['processor']}, {facts['cores']} cores, {' '.join(facts['vector_units'])}, load {facts['load']}",
+        f"{facts['system']}, Python {facts['python']}, {versions}",
+        f"OpenGL of the peers: {facts.get('opengl') or 'none'}",
+    ]
+    if facts["load"] is not None and facts["load"] > 0.5:
+        lines.append("This machine is busy with other things: the figures say little.")
+    return lines
+
+
+def save(path: Path, results: Results, facts: dict[str, Any]) -> Path:
+    """Write facts and figures as JSON."""
+    text = json.dumps({"machine": facts, "figures": list(results)}, indent=2, ensure_ascii=False)
+    return write_atomic(path, lambda file: file.write(text.encode() + b"\n"))
+
+
+def number(value: float) -> str:
+    """Three significant digits without an exponent."""
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+def _figures(results: Results) -> Any:
+    from rich.table import Table
+
+    table = Table(title="figures: ratios of medians, with the smallest and largest of a round")
+    for heading in ("work", "scene", "lit per", "measure"):
+        table.add_column(heading)
+    for heading in ("asked", "reached", "noise"):
+        table.add_column(heading, justify="right")
+    table.add_column("met")
+    table.add_column("note")
+    for f in results:
+        met = "" if f["met"] is None else "yes" if f["met"] else "[bold red]no[/]"
+        noise = f"{number(f['low'])} … {number(f['high'])}"
+        reached = f"{number(f['value'])} {f['unit']}"
+        table.add_row(
+            f["work"], f["scene"], f["lighting"], f["measure"], f["bar"] or "", reached, noise, met, f["note"]
+        )
+    return table
+
+
+def _times(results: Results) -> Any:
+    from rich.table import Table
+
+    table = Table(title="times in milliseconds")
+    for heading in ("work", "scene", "lit per", "contender"):
+        table.add_column(heading)
+    for heading in ("median", "min … max", "rounds × frames"):
+        table.add_column(heading, justify="right")
+    rows = {}
+    for f in results:
+        for name, t in f["times"].items():
+            spread = f"{number(1e3 * t['min_s'])} … {number(1e3 * t['max_s'])}"
+            taken = f"{t['rounds']} × {t['frames']}"
+            rows[f["work"], f["scene"], f["lighting"], name] = (number(1e3 * t["median_s"]), spread, taken)
+    for key, row in rows.items():
+        table.add_row(*key, *row)
+    return table
