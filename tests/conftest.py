@@ -1,0 +1,39 @@
+"""Fixtures for all tests."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from commandline import SQUARE, Result, Run
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty current folder with a square as square.off."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("AUTOSTEREO_DEBUG", raising=False)
+    (tmp_path / "square.off").write_text(SQUARE)
+    return tmp_path
+
+
+@pytest.fixture
+def cli(folder: Path, capsys: pytest.CaptureFixture[str]) -> Iterator[Run]:
+    """Run a command line in this process."""
+
+    from autostereo.cli.app import run
+
+    def call(*arguments: str) -> Result:
+        capsys.readouterr()
+        handler = signal.getsignal(signal.SIGINT)
+        try:
+            status = run(arguments)
+        finally:
+            signal.signal(signal.SIGINT, handler)
+        out, err = capsys.readouterr()
+        return Result(status, out, err)
+
+    yield call

@@ -1,0 +1,292 @@
+"""The command line and bad input: one clear line, exit codes, nothing half-written."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import autostereo as aus
+from commandline import SMALL, SQUARE, Run, files, pixels, refused
+
+# --- bad input -----------------------------------------------------------------------------------------------------
+TEXTURED = b"usemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
+BAD_FILES = {
+    "missing.ply": None,
+    "unknown.xyzzy": b"something",
+    "empty.ply": b"",
+    "page.ply": b"<!DOCTYPE html><html><body>404</body></html>",
+    "truncated.ply": b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    b"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0",
+    "binary.ply": b"ply\nformat binary_little_endian 1.0\nelement vertex 9\nproperty float x\nproperty float y\n"
+    b"property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\x00\x01\x02",
+    "nan.off": SQUARE.replace("-1 -1 0", "nan -1 0").encode(),
+    "infinite.off": SQUARE.replace("-1 -1 0", "inf -1 0").encode(),
+    "range.off": SQUARE.replace("3 0 2 3", "3 0 2 7").encode(),
+    "none.off": b"OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n",
+    "garbage.glb": b"glTF\x02\x00\x00\x00\xff\xff\xff\xff",
+    "text.stl": b"solid nothing\nendsolid nothing\n",
+    "missing_texture.obj": b"mtllib m.mtl\n" + TEXTURED,
+    "broken_texture.obj": b"mtllib n.mtl\n" + TEXTURED,
+}
+
+
+@pytest.mark.parametrize("name", BAD_FILES)
+def test_bad_scene_file(cli: Run, folder: Path, name: str) -> None:
+    content = BAD_FILES[name]
+    if content is not None:
+        Path(name).write_bytes(content)
+    Path("m.mtl").write_text("newmtl a\nmap_Kd nowhere.png\n")
+    Path("n.mtl").write_text("newmtl a\nmap_Kd broken.png\n")
+    Path("broken.png").write_bytes(b"\x89PNG\r\n\x1a\nbut then nothing")
+    before = files(folder)
+    refused(cli("render", name, "-d", "lenticular-8", "-o", "out.png", *SMALL), name)
+    assert files(folder) == before
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        SQUARE.replace("1 1 0\n", "1 -1 0\n"),  # a triangle without area
+        SQUARE.replace("4 2 0", "4 3 0") + "3 0 1 2\n",  # a face twice: an edge with more than two triangles
+        "OFF\n3 1 0\n0 0 0\n0 0 0\n0 0 0\n3 0 1 2\n",  # a single point
+    ],
+)
+def test_degenerate_meshes_are_legal(cli: Run, folder: Path, text: str) -> None:
+    Path("odd.off").write_text(text)
+    result = cli("render", "odd.off", "-d", "lenticular-8", "-o", "out.png", *SMALL)
+    assert result.status == 0, result.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (("--size", "0x10"), "--size"),
+        (("--size", "10"), "--size"),
+        (("--size", "-5x5"), "--size"),
+        (("--size", "100000000x100000000"), "--size"),
+        (("--views", "0"), "--views"),
+        (("--views", "7"), "views"),  # a table has 8
+        (("--views", "many"), "--views"),
+        (("--samples", "3"), "samples"),
+        (("--shading", "none"), "shading"),
+        (("--engine", "warp"), "warp"),
+        (("--method", "magic"), "magic"),
+        (("--background", "mauve"), "--background"),
+        (("--background", "2,0,0"), "--background"),
+        (("--continuous",), "continuous"),
+        (("--camera", "nowhere.json"), "nowhere.json"),
+        (("--nonsense",), "--nonsense"),
+        (("-o", "out.xyz"), ".png"),
+        (("-o", "nowhere/out.png"), "nowhere"),
+        (("-o", "."), "folder"),
+    ],
+)
+def test_bad_option(cli: Run, folder: Path, arguments: tuple[str, ...], word: str) -> None:
+    refused(cli("render", "square.off", "-d", "wavelength-selective-8", "--size", "48x64", *arguments), word)
+    assert files(folder) == {"square.off"}
+
+
+def test_usage_errors(cli: Run) -> None:
+    refused(cli("render"), "IN...")
+    refused(cli("render", "square.off"), "--display")
+    refused(cli("paint"), "paint")
+    refused(cli("render", "square.off", "-d", "looking-glass-portrai", *SMALL), "looking-glass-portrait")
+
+
+def test_output_is_checked_before_the_input_is_read(cli: Run, folder: Path) -> None:
+    refused(cli("render", "missing.ply", "-d", "lenticular-8", "-o", "nowhere/out.png"), "nowhere/out.png")
+    refused(cli("views", "missing.ply", "-o", "nowhere/out"), "nowhere/out")
+    refused(cli("quilt", "missing.ply", "-d", "looking-glass-go", "-o", "nowhere/out.png"), "nowhere/out")
+    refused(cli("demo", "-o", "nowhere/demo"), "nowhere/demo")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_folder_that_is_not_writable(cli: Run, folder: Path) -> None:
+    (folder / "locked").mkdir(mode=0o500)
+    refused(cli("render", "square.off", "-d", "lenticular-8", "-o", "locked/out.png"), "not writable")
+
+
+def test_folder_that_refuses_files(cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same for root, who can be refused by a read-only file system only."""
+
+    def refuse(**_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("tempfile.TemporaryFile", refuse)
+    refused(cli("render", "square.off", "-d", "lenticular-8", "-o", "out.png"), "not writable", "Permission denied")
+
+
+def test_output_folder_is_a_file(cli: Run, folder: Path) -> None:
+    Path("taken").write_text("a file")
+    refused(cli("views", "square.off", "-o", "taken", "--size", "16x16"), "taken")
+    assert Path("taken").read_text() == "a file"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "{not json",
+        '{"position": [0, 0]}',
+        '{"fov_y": "wide"}',
+        '{"views": 2.5}',
+        '{"offsets": [1, 0]}',
+        '{"colour": 1}',
+        '{"up": [0, 0, 1], "position": [0, 0, 4], "target": [0, 0, 0]}',
+    ],
+)
+def test_bad_camera_file(cli: Run, folder: Path, text: str) -> None:
+    Path("rig.json").write_text(text)
+    refused(cli("render", "square.off", "-d", "lenticular-8", "--camera", "rig.json"), "rig.json")
+
+
+def test_scene_behind_the_camera(cli: Run, folder: Path) -> None:
+    aus.Rig(position=(0, 0, -4), target=(0, 0, -8)).save("rig.json")
+    refused(cli("render", "square.off", "-d", "lenticular-8", "--camera", "rig.json", *SMALL), "behind")
+
+
+CALIBRATION = {
+    key: {"value": value}
+    for key, value in {
+        "pitch": 52.0, "slope": -7.0, "center": 0.4, "viewCone": 40.0, "invView": 1, "DPI": 324.0, "screenW": 64,
+        "screenH": 48, "flipImageX": 0, "flipImageY": 0, "flipSubp": 0,
+    }.items()
+}  # fmt: skip
+
+
+def test_calibration_file(cli: Run, folder: Path) -> None:
+    Path("visual.json").write_text(json.dumps(CALIBRATION))
+    assert cli("render", "square.off", "-d", "visual.json").status == 0
+    assert pixels("square_visual.png").shape == (48, 64, 3)
+
+
+@pytest.mark.parametrize("field", ["pitch", "slope", "center", "DPI", "screenW", "screenH"])
+@pytest.mark.parametrize("damage", ["missing", "text", "zero", "nested"])
+def test_bad_calibration(cli: Run, folder: Path, field: str, damage: str) -> None:
+    if damage == "zero" and field == "center":
+        pytest.skip("center may be 0")
+    broken = dict(CALIBRATION)
+    if damage == "missing":
+        del broken[field]
+    else:
+        broken[field] = {"value": {"text": "wide", "zero": 0, "nested": [1]}[damage]}
+    Path("visual.json").write_text(json.dumps(broken))
+    refused(cli("render", "square.off", "-d", "visual.json", "-o", "out.png"), "visual.json", field)
+
+
+BAD_KIND = 'source = "x"\nwidth = 8\nheight = 8\n[mask]\nkind = "fog"'
+
+
+@pytest.mark.parametrize("text", ["", "width = ", "width = 5", BAD_KIND])
+def test_bad_display_file(cli: Run, folder: Path, text: str) -> None:
+    Path("mine.toml").write_text(text)
+    refused(cli("render", "square.off", "-d", "mine.toml"), "mine.toml")
+
+
+def test_bad_pictures(cli: Run, folder: Path) -> None:
+    Path("noise_qs4x3a1.png").write_bytes(b"no picture")
+    for name in ("noise_qs4x3a1.png", "gone_qs4x3a1.png"):
+        refused(cli("weave", name, "-d", "looking-glass-portrait", "-o", "out.png"), name)
+        refused(cli("observe", name, "-d", "looking-glass-portrait", "--view", "1", "-o", "out.png"), name)
+    assert not Path("out.png").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("render", "square.off", "-d", "looking-glass-portrait", "--size", "65535x65535"),
+        ("views", "square.off", "-o", "out", "--views", "60000", "--size", "60000x60000"),
+        ("quilt", "square.off", "--grid", "32x32", "--view-size", "60000x60000"),
+    ],
+)
+def test_absurd_sizes_say_what_memory_they_would_take(cli: Run, folder: Path, arguments: tuple[str, ...]) -> None:
+    refused(cli(*arguments), "GB")
+    assert files(folder) == {"square.off"}
+
+
+# --- interruptions and surprises -------------------------------------------------------------------------------------
+def test_memory_error_is_one_line(cli: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def exhausted(*_: object, **__: object) -> None:
+        raise MemoryError("Unable to allocate 9 TiB")
+
+    monkeypatch.setattr("autostereo.cli.common.load_scene", exhausted)
+    refused(cli("render", "square.off", "-d", "lenticular-8"), "memory", "9 TiB")
+
+
+def test_unexpected_errors_are_one_line_and_a_traceback_only_on_demand(
+    cli: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("oops")
+
+    monkeypatch.setattr("autostereo.cli.common.load_scene", broken)
+    result = cli("render", "square.off", "-d", "lenticular-8")
+    assert result.status == 1
+    assert re.fullmatch(r"autostereo: error: internal error: ZeroDivisionError: oops [^\n]+\n", result.err)
+    monkeypatch.setenv("AUTOSTEREO_DEBUG", "1")
+    with pytest.raises(ZeroDivisionError):
+        cli("render", "square.off", "-d", "lenticular-8")
+
+
+def test_interrupt_while_writing_leaves_nothing(cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C after some of the files are written."""
+    from autostereo import image
+
+    write = image.write_image
+
+    def interrupted(path: Path, *rest: object) -> Path:
+        if path.name == "view_002.png":
+            raise KeyboardInterrupt
+        return write(path, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("autostereo.frame.write_image", interrupted)
+    result = cli("views", "square.off", "-o", "out", "--size", "16x16")
+    assert result.status == 130
+    assert {path.name for path in folder.iterdir()} == {"square.off"}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signal_in_the_middle(folder: Path, number: signal.Signals) -> None:
+    """A process that is stopped while it renders exits with 128 + signal, says at most one line, and leaves nothing."""
+    code = (
+        "import sys, time\nimport autostereo.cli.common as common\n"
+        "def slow(*_): print('started', flush=True); time.sleep(60)\n"
+        "common.load_scene = slow\n"
+        "from autostereo.cli import main\n"
+        "sys.argv = ['autostereo', 'views', 'square.off', '-o', 'out']\nmain()\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "started\n"
+    time.sleep(0.1)
+    process.send_signal(number)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 128 + number
+    assert "Traceback" not in err and len(err.splitlines()) <= 1
+    assert {path.name for path in folder.iterdir()} == {"square.off"}
+
+
+def test_a_closed_pipe_is_no_error(folder: Path) -> None:
+    command = f"{sys.executable} -c 'from autostereo.cli import main; main()' displays | head -n 1"
+    done = subprocess.run(command, shell=True, cwd=folder, capture_output=True, text=True)
+    assert done.stdout.startswith("acer") and done.stderr == ""
+
+
+def test_no_progress_in_a_pipe(folder: Path) -> None:
+    code = "from autostereo.cli import main; main()"
+    command = [sys.executable, "-c", code, "render", "square.off", "-d", "lenticular-8", "--size", "48x64"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0
+    assert "\x1b" not in done.stdout + done.stderr and "\r" not in done.stdout + done.stderr
+    assert done.stdout == "square_lenticular-8.png  48×64\n"
