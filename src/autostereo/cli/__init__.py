@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 
 
@@ -9,4 +10,5 @@ def main() -> None:
     """Run the command line on sys.argv and exit with its status."""
     from .app import run
 
+    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))  # so that temporary files are removed
     sys.exit(run(sys.argv[1:]))

@@ -125,11 +125,16 @@ def check_views(views: int | None) -> None:
 
 # --- output --------------------------------------------------------------------------------------------------------
 def check_output(path: Path, suffixes: tuple[str, ...] = ()) -> Path:
-    """Refuse, before the long work, a path that could not be written after it."""
+    """Refuse, before the long work, a path that could not be written after it.
+
+    With `suffixes` it is to be a file, without them a folder.
+    """
+    if suffixes and path.is_dir():
+        raise FileError(f"{path}: expected a file name, found a folder")
+    if not suffixes and path.exists() and not path.is_dir():
+        raise FileError(f"{path}: expected a folder, found a file")
     if suffixes and path.suffix.lower() not in suffixes:
         raise InputError(f"{path}: expected a name ending in {' '.join(suffixes)}, got {path.suffix or 'no suffix'}")
-    if path.is_dir() and suffixes:
-        raise FileError(f"{path}: expected a file name, found a folder")
     folder = path.parent
     if not folder.is_dir():
         raise FileError(f"{path}: the folder {folder} does not exist")
@@ -142,21 +147,23 @@ def check_output(path: Path, suffixes: tuple[str, ...] = ()) -> Path:
 
 
 @contextmanager
-def whole_folder(path: Path) -> Iterator[Path]:
+def whole_folder(path: Path, stale: str = "") -> Iterator[Path]:
     """Give a temporary folder to fill; when all went well its files appear in `path`, else nothing does.
 
-    In a folder that exists, files of the same name are replaced.
+    In a folder that exists, files of the same name are replaced, and others that match the pattern `stale` removed.
     """
-    if path.exists() and not path.is_dir():
-        raise FileError(f"{path}: expected a folder, found a file")
     check_output(path)
     temporary = path.parent / f".{path.name}.{secrets.token_hex(4)}.part"
     try:
         temporary.mkdir()
         yield temporary
         if path.is_dir():
-            for item in temporary.iterdir():
+            made = sorted(temporary.iterdir())
+            for item in made:
                 os.replace(item, path / item.name)
+            for old in path.glob(stale) if stale else ():
+                if old.name not in {item.name for item in made}:
+                    old.unlink()
         else:
             os.replace(temporary, path)
     except OSError as error:

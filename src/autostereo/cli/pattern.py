@@ -153,13 +153,13 @@ def spread(display: Display, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 def _spread_packed(display: Display, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """The same for layouts without a mask: enlarge, then pack."""
+    if display.views < 2:
+        raise InputError(f"{display.name}: a {display.layout} picture has no views to tell apart")
     import numpy as np
 
     from ..frame import ViewStack
     from ..render import interlace
 
-    if display.views < 2:
-        raise InputError(f"{display.name}: a {display.layout} picture has no views to tell apart")
     count, h, w, _ = pictures.shape
     width, height = display.view_size
     color = np.full((count, height, width, 4), 255, dtype=np.uint8)

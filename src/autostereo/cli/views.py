@@ -70,7 +70,7 @@ def views(
         elif suffix:
             stack.save(output)
         else:
-            with common.whole_folder(output) as folder:
+            with common.whole_folder(output, stale="view_*.png") as folder:
                 stack.save(folder)
                 rig.save(folder / "rig.json")
     say(f"{output}  {rig.views} views of {shape[0]}×{shape[1]}")
