@@ -64,17 +64,18 @@ def _cell(mode, x, y):
 
 
 @kernel
-def _wrapped(t, reverse):
-    """Fraction of t in [0, 1), mirrored if `reverse` (0 stays 0)."""
-    phi = t - np.floor(t)
-    if reverse:
-        phi = 1.0 - phi
-    return phi if phi < 1.0 else 0.0  # 1 − 1e-17 rounds to 1
+def _wrap(flat, reverse):
+    """Replace each t by its fraction in [0, 1), mirrored if `reverse` (0 stays 0). Alone, this loop is vectorised."""
+    for i in range(flat.shape[0]):
+        phi = flat[i] - np.floor(flat[i])
+        if reverse:
+            phi = 1.0 - phi
+        flat[i] = phi if phi < 1.0 else 0.0  # 1 − 1e-17 rounds to 1
 
 
 @kernel
 def row_phase(r, width, table, a, b, offsets, cell_mode, height, views, continuous, reverse, out):
-    """Fill out (W, 3) float64 with the phases φ ∈ [0, 1) of row r; a table's phase is (view + ½)/V.
+    """Fill out (W, 3) float64, C-contiguous, with the phases φ ∈ [0, 1) of row r; a table's phase is (view + ½)/V.
 
     `table … reverse` are those of `map_args`; equals `ViewMap.phase` bit for bit.
     """
@@ -85,25 +86,28 @@ def row_phase(r, width, table, a, b, offsets, cell_mode, height, views, continuo
             for c in range(3):
                 view = row[entry, c]
                 out[x, c] = ((views - 1 - view if reverse else view) + 0.5) / views
-    elif offsets.shape[0] == 1 or cell_mode == 0:
-        br, o0, o1, o2 = b * r, offsets[0, 0], offsets[0, 1], offsets[0, 2]
+        return
+    br = b * r
+    if offsets.shape[0] == 1 or cell_mode == 0:
+        o0, o1, o2 = offsets[0, 0], offsets[0, 1], offsets[0, 2]
         for x in range(width):
             t = a * x + br
-            out[x, 0] = _wrapped(t + o0, reverse)
-            out[x, 1] = _wrapped(t + o1, reverse)
-            out[x, 2] = _wrapped(t + o2, reverse)
+            out[x, 0] = t + o0
+            out[x, 1] = t + o1
+            out[x, 2] = t + o2
     else:
         y = height - 1 - r
         for x in range(width):
-            t = a * x + b * r
+            t = a * x + br
             cell = _cell(cell_mode, x, y) % offsets.shape[0]
             for c in range(3):
-                out[x, c] = _wrapped(t + offsets[cell, c], reverse)
+                out[x, c] = t + offsets[cell, c]
+    _wrap(out.reshape(-1), reverse)
 
 
 @kernel
 def row_camera(r, width, table, a, b, offsets, cell_mode, height, views, continuous, reverse, out):
-    """Fill out (W, 3) float64 with the camera coordinates u of row r, whole numbers when the map is discrete.
+    """Fill out (W, 3) float64, C-contiguous, with the camera coordinates u of row r; whole if the map is discrete.
 
     `table … reverse` are those of `map_args`; equals `ViewMap.camera` bit for bit.
     """
