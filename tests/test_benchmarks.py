@@ -15,6 +15,8 @@ from hypothesis import strategies as st
 from autostereo.cli.benchmarks import harness, jobs, mesh, peers_moderngl, peers_numpy, peers_vtk, report, workloads
 from autostereo.cli.benchmarks.contenders import BenchOptions
 from autostereo.display.rig import Rig
+from autostereo.engines.engine import Camera, Draw, Target, get_engine
+from autostereo.engines.options import Options
 from autostereo.errors import DependencyError, InputError
 from autostereo.scene.appearance import Material
 from autostereo.scene.mesh import Mesh
@@ -183,6 +185,24 @@ def test_peers_draw_the_same_picture(lighting, variant, two_sided):
         assert (np.abs(ours - other).max(axis=2) > 2).mean() < 1e-3
     first.release()
     second.release()
+
+
+@pytest.mark.parametrize("lighting", mesh.LIGHTINGS)
+def test_moderngl_draws_what_the_reference_engine_draws(lighting):
+    scene = workloads.sphere_scene(3, specular=0.3)
+    rig = workloads.rig_for(scene, 3, SIZE)
+    focal_length = SIZE[1] / 2 / np.tan(np.radians(rig.fov_y) / 2)
+    camera = Camera(rig.eye_from_world, focal_length, focal_length, *SIZE, rig.focal, rig.near_depth)
+    offsets = rig.camera_offsets
+    target = Target(np.zeros((3, SIZE[1], SIZE[0], 4), np.uint8))
+    engine = get_engine("reference")
+    draw = Draw(camera, offsets, (offsets[0], offsets[-1]), options=Options(lighting=lighting))
+    engine.draw(engine.prepare(scene), draw, target)
+    loop = moderngl_loop(scene, rig, SIZE, lighting)
+    for view in range(3):
+        difference = np.abs(loop.picture(view).astype(int) - target.color[view, ..., :3]).max(axis=2)
+        assert (difference > 2).mean() < 1e-3  # silhouettes
+    loop.release()
 
 
 def test_moderngl_lights_back_sides_with_the_opposite_normal():

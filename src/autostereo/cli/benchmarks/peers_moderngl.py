@@ -158,7 +158,9 @@ class ModernGLLoop:
         self._matrix, self._eye = self._program["clip_from_world"], self._program.get("eye", None)
         # moderngl and GLSL store matrices by columns
         self._matrices = [m.T.astype("f4").tobytes() for m in clip_from_world(rig, size)]
-        self._eyes = [e.astype("f4").tobytes() for e in eyes(rig)]
+        # vertices are lit for the centre eye, so that all views show the same colours
+        lit_for = eyes(rig) if lighting == "sample" else np.broadcast_to(rig.position, (rig.views, 3))
+        self._eyes = [eye.astype("f4").tobytes() for eye in lit_for]
         self._two_sided = mesh.two_sided
 
     def enter(self) -> None:
