@@ -42,8 +42,8 @@ def bench(
 
     options = BenchOptions(quick=quick, only=tuple(only or ()), data=data)
     common.announce_compilation("cpu")
+    facts = mesh.facts(options)  # before the run, whose own load does not count
     results = mesh.run(options, common.note)
-    facts = mesh.facts(options)
     if json is not None:
         report.save(json, results, facts)
     report.show(results, facts)
