@@ -188,7 +188,7 @@ def test_textures_become_rgb_bytes():
     shared = np.zeros((4, 4, 3), np.uint8)
     assert check_image("texture", shared) is shared
     for bad in (np.zeros((2, 2, 5), np.uint8), np.zeros((0, 2, 3), np.uint8), np.zeros((2, 2, 3), np.int64), "x"):
-        with pytest.raises(InputError, match="^texture: "):
+        with pytest.raises(InputError, match=r"^texture: "):
             check_image("texture", bad)
     with pytest.raises(InputError, match="texture: expected finite"):
         check_image("texture", np.full((2, 2), np.nan))

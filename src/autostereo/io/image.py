@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -33,25 +35,33 @@ def decode_image(data: bytes, name: str) -> NDArray[np.uint8]:
     """Decode the bytes of a picture file, as `read_image`; `name` is what an error calls it."""
     from PIL import Image
 
-    try:
-        with _PILLOW_LIMIT:
-            # Pillow refuses 179 Mpx while it opens a file, and a 16384² quilt has 268
-            limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
-            try:
-                image = Image.open(io.BytesIO(data))
-            finally:
-                Image.MAX_IMAGE_PIXELS = limit
-    except Exception as error:
-        raise FileError(f"{name}: is not a picture that can be read (PNG, JPEG, WebP, TIFF, BMP, …)") from error
-    width, height = image.size
-    if width * height > MAX_PIXELS:
-        raise FileError(f"{name}: a picture of {width}×{height} pixels is too large, the limit is {MAX_PIXELS}")
-    try:
-        return _as_rgb(image)
-    except MemoryError:
-        raise FileError(f"{name}: not enough memory for {width}×{height} pixels") from None
-    except Exception as error:  # decoders raise OSError, SyntaxError, ValueError, struct.error, zlib.error …
-        raise FileError(f"{name}: the picture is damaged or truncated ({error})") from error
+    with _without_pillow_limit():
+        try:
+            image = Image.open(io.BytesIO(data))
+        except Exception as error:
+            raise FileError(f"{name}: is not a picture that can be read (PNG, JPEG, WebP, TIFF, BMP, …)") from error
+        width, height = image.size
+        if width * height > MAX_PIXELS:
+            raise FileError(f"{name}: a picture of {width}×{height} pixels is too large, the limit is {MAX_PIXELS}")
+        try:
+            return _as_rgb(image)
+        except MemoryError:
+            raise FileError(f"{name}: not enough memory for {width}×{height} pixels") from None
+        except Exception as error:  # decoders raise OSError, SyntaxError, ValueError, struct.error, zlib.error …
+            raise FileError(f"{name}: the picture is damaged or truncated ({error})") from error
+
+
+@contextmanager
+def _without_pillow_limit() -> Iterator[None]:
+    """Lift Pillow's limit, which warns above 89 Mpx and refuses above 179: a 16384² quilt has 268."""
+    from PIL import Image
+
+    with _PILLOW_LIMIT:
+        limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
+        try:
+            yield
+        finally:
+            Image.MAX_IMAGE_PIXELS = limit
 
 
 def _as_rgb(image: Any) -> NDArray[np.uint8]:
@@ -63,4 +73,9 @@ def _as_rgb(image: Any) -> NDArray[np.uint8]:
         raise ValueError(f"pixels of type {image.mode} have no fixed range")
     see_through = image.mode in ("RGBA", "LA", "PA", "RGBa", "La") or "transparency" in image.info
     mode = "RGBA" if see_through else "RGB"
-    return np.ascontiguousarray(np.asarray(image if image.mode == mode else image.convert(mode)))
+    width, height = image.size
+    pixels = np.empty((height, width, len(mode)), dtype=np.uint8)
+    for top in range(0, height, 1024):  # in strips: a second copy of a large quilt would cost a gigabyte
+        strip = image.crop((0, top, width, min(top + 1024, height)))
+        pixels[top : top + 1024] = np.asarray(strip if strip.mode == mode else strip.convert(mode))
+    return pixels

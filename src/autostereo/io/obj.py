@@ -104,7 +104,8 @@ def load_obj(path: PathLike) -> list[Mesh]:
         texture = None
         if surface.texture is not None and mesh_uv is not None:
             if surface.texture not in textures:
-                textures[surface.texture] = read_image(surface.texture, asked_by=path)
+                pixels = read_image(surface.texture, asked_by=path)[..., :3]
+                textures[surface.texture] = np.ascontiguousarray(pixels)  # one array for all that wear it
             texture = textures[surface.texture]
         kd = np.ones((len(v), 3)) if colors is None else colors[v]
         mesh = Mesh(
@@ -178,9 +179,7 @@ def _vertices(lines: list[bytes], path: PathLike) -> tuple[NDArray[np.float64], 
     return rows[:, :3], colors
 
 
-def _corners(
-    text: _Text, sizes: tuple[int, int, int], path: PathLike
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _corners(text: _Text, sizes: tuple[int, int, int], path: PathLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Corners of each face (P,), and v, vt, vn of every corner (C, 3) counted from 0; −1: not given."""
     faces = [line.partition(b"#")[0].split() for line in text.f]
     counts = np.array([len(words) for words in faces], dtype=np.int64)

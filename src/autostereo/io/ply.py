@@ -222,7 +222,7 @@ def _interleave(
         for rows, part in parts:
             ragged = part[entry.name]
             each = int(ragged.counts[0])  # type: ignore[union-attr]
-            values[first[rows, None] + np.arange(each)] = ragged.values.reshape(-1, each)  # type: ignore[union-attr]
+            values[first[rows, None] + np.arange(each)] = ragged.values.reshape(len(rows), each)  # type: ignore[union-attr]
         columns[entry.name] = Ragged(counts, values)
     return columns
 
@@ -275,9 +275,7 @@ class _Ascii:
         counts: list[list[int]] = [[] for _ in element.properties]
         chunks: list[list[NDArray[np.float64]]] = [[np.empty(0)] for _ in element.properties]
         for _ in range(element.count):
-            for k, (size, entry) in enumerate(
-                zip(self._sizes_at(element, self.at), element.properties, strict=True)
-            ):
+            for k, (size, entry) in enumerate(zip(self._sizes_at(element, self.at), element.properties, strict=True)):
                 self.at += entry.count_kind is not None
                 counts[k].append(size)
                 chunks[k].append(self.words[self.at : self.at + size])

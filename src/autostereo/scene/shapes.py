@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from .appearance import DirectionalLight, Material, PointLight, Vector, check_nu
 from .mesh import Mesh
 from .scene import Scene
 
-Floats = NDArray[np.float64]
+Floats = NDArray[Any]
 
 
 def icosphere(subdivisions: int = 3, radius: float = 1.0) -> Mesh:
@@ -134,7 +135,7 @@ def demo_scene() -> Scene:
         texture=checker(8, 512, (0.82, 0.80, 0.76), (0.30, 0.34, 0.42)),
         transform=translation(0.0, -1.05, -0.6) @ rotation((1, 0, 0), -90),
     )
-    floor = replace(floor, uv=floor.uv * (1.8, 1.4))
+    floor = replace(floor, uv=floor.uv * np.array((1.8, 1.4)))
     rock = replace(
         displaced_sphere(5, 0.95),
         material=Material(specular=0.25, shininess=24.0),
