@@ -140,17 +140,20 @@ def _statements(data: bytes) -> _Text:
     """Sort the lines of an OBJ file by their first word."""
     text = _Text()
     lists = {b"v": text.v, b"vt": text.vt, b"vn": text.vn}
-    current = last_known = None
+    current, grown = None, True
     for line in data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines():
-        word, _, rest = line.strip().replace(b"\t", b" ").partition(b" ")
-        if word in lists:
-            lists[word].append(rest)
-        elif word == b"f":
-            known = (len(text.v), len(text.vt), len(text.vn))
-            if known != last_known:
-                text.known.append((len(text.f), *known))
-                last_known = known
+        words = line.split(None, 1)
+        if len(words) < 2:
+            continue
+        word, rest = words
+        if word == b"f":
+            if grown:
+                text.known.append((len(text.f), len(text.v), len(text.vt), len(text.vn)))
+                grown = False
             text.f.append(rest)
+        elif word in lists:
+            lists[word].append(rest)
+            grown = True
         elif word == b"usemtl" and rest.strip() != current:
             current = rest.strip()
             text.used.append((len(text.f), current))
@@ -159,11 +162,16 @@ def _statements(data: bytes) -> _Text:
     return text
 
 
+def _words(lines: list[bytes]) -> list[list[bytes]]:
+    """Words of each line, without comments."""
+    return [(line.partition(b"#")[0] if b"#" in line else line).split() for line in lines]
+
+
 def _rows(lines: list[bytes], least: int, path: PathLike, what: str) -> NDArray[np.float64]:
     """Numbers (n, k), k ≥ least the words of the shortest line."""
     if not lines:
         return np.zeros((0, least))
-    rows = [line.partition(b"#")[0].split() for line in lines]
+    rows = _words(lines)
     width = min(map(len, rows))
     if width < least:
         raise FileError(f"{path}: expected {least} numbers or more for {what}, found {width} (truncated?)")
@@ -181,7 +189,7 @@ def _vertices(lines: list[bytes], path: PathLike) -> tuple[NDArray[np.float64], 
 
 def _corners(text: _Text, sizes: tuple[int, int, int], path: PathLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Corners of each face (P,), and v, vt, vn of every corner (C, 3) counted from 0; −1: not given."""
-    faces = [line.partition(b"#")[0].split() for line in text.f]
+    faces = _words(text.f)
     counts = np.array([len(words) for words in faces], dtype=np.int64)
     joined = b" ".join([word for words in faces for word in words])
     # v//n and v/ leave an index out: 0 stands for it, no index is 0
