@@ -97,6 +97,14 @@ class Engine(Protocol):
     def interlace(self, views: NDArray[np.uint8], draw: Draw, out: NDArray[np.uint8]) -> None:
         """Gather out[r, x, c] from views (V, H, W, 4) by `draw.viewmap`, with flips; u is rounded to a view."""
 
+    def merge_view(self, view: NDArray[np.uint8], index: int, draw: Draw, out: NDArray[np.uint8]) -> None:
+        """Write into the panel those sub-pixels that show view `index`, from its picture (H, W, 4)."""
+
+    def weave(
+        self, quilt: NDArray[np.uint8], grid: tuple[int, int], draw: Draw, size: tuple[int, int]
+    ) -> NDArray[np.uint8]:
+        """Gather a panel of `size` from a quilt of views of another size, bilinearly."""
+
 
 def _cpu() -> Engine:
     from .cpu.engine import CpuEngine

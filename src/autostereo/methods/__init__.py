@@ -1,0 +1,22 @@
+"""In which order: schedules of draws that work on any engine. METHODS lists every one."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+from ..engines.engine import Engine
+from ..errors import UnsupportedError
+from . import n_pass, n_pass_subres, single_pass
+
+METHODS: dict[str, ModuleType] = {
+    "single-pass": single_pass,
+    "n-pass": n_pass,
+    "n-pass-subres": n_pass_subres,
+}
+
+
+def get_method(name: str, engine: Engine) -> ModuleType:
+    """Return the schedule called `name`, which has draw_views and draw_panel, if `engine` can draw it."""
+    if name not in METHODS or name not in engine.methods:
+        raise UnsupportedError(f"method {name!r}: the {engine.name} engine has {', '.join(engine.methods)}")
+    return METHODS[name]

@@ -182,6 +182,28 @@ def interlace(
     run_rows(out.shape[0], lambda start, stop: _interlace_rows(views, m, flip_x, flip_y, (start, stop), out))
 
 
+@kernel
+def _merge_rows(picture, index, m, flips, rows, out):
+    height, width = out.shape[0], out.shape[1]
+    u, view = np.empty((width, 3)), np.empty(3 * width, np.int32)
+    for r in range(rows[0], rows[1]):
+        _row_views(r, width, m, u, view)
+        source, target = picture[height - 1 - r if flips[1] else r], out[r]
+        for x in range(width):
+            column = width - 1 - x if flips[0] else x
+            for c in range(3):
+                if view[3 * x + c] == index:
+                    target[x, c] = source[column, c]
+
+
+def merge_view(
+    picture: NDArray[np.uint8], index: int, viewmap: ViewMap, flips: tuple[bool, bool], out: NDArray[np.uint8]
+) -> None:
+    """Write those sub-pixels of the panel that show view `index`, from that view's picture (H, W, 4); see `interlace`."""
+    m = map_args(viewmap)
+    run_rows(out.shape[0], lambda start, stop: _merge_rows(picture, index, m, flips, (start, stop), out))
+
+
 # --- weave ---------------------------------------------------------------------------------------------------
 
 

@@ -16,6 +16,7 @@ from ...scene.scene import Scene
 from ...viewmap import offset_at
 from ..engine import Camera, Draw, Target
 from ..options import Options
+from . import gather
 from .mesh import Hits, Samples, Surface, trace
 from .shading import lights_in_eye_space, shade
 
@@ -78,12 +79,21 @@ class ReferenceEngine:
     def interlace(self, views: NDArray[np.uint8], draw: Draw, out: NDArray[np.uint8]) -> None:
         """Gather out[r, x, c] from views (V, H, W, 4) by `draw.viewmap`, with flips; u is rounded to a view."""
         assert draw.viewmap is not None
-        height, width, _ = out.shape
-        rows, columns = np.arange(height), np.arange(width)
-        view = draw.viewmap.view(rows, columns)
-        r = (height - 1 - rows if draw.flip_y else rows)[:, None, None]
-        x = (width - 1 - columns if draw.flip_x else columns)[None, :, None]
-        out[...] = views[view, r, x, np.arange(3)]
+        gather.interlace(views, draw.viewmap, draw.flip_x, draw.flip_y, out)
+
+    def merge_view(self, view: NDArray[np.uint8], index: int, draw: Draw, out: NDArray[np.uint8]) -> None:
+        """Write into the panel those sub-pixels that show view `index`, from its picture (H, W, 4)."""
+        assert draw.viewmap is not None
+        u = draw.viewmap.camera(np.arange(out.shape[0]), np.arange(out.shape[1]))
+        mine = gather.nearest_view(u, draw.viewmap.views) == index
+        out[mine] = view[(*flips(draw), slice(3))][mine]
+
+    def weave(
+        self, quilt: NDArray[np.uint8], grid: tuple[int, int], draw: Draw, size: tuple[int, int]
+    ) -> NDArray[np.uint8]:
+        """Gather a panel of `size` from a quilt of views of another size, bilinearly."""
+        assert draw.viewmap is not None
+        return gather.weave(quilt, grid, draw.viewmap, size, "linear", (draw.flip_x, draw.flip_y))
 
 
 def flips(draw: Draw) -> tuple[slice, slice]:

@@ -1,0 +1,235 @@
+"""Segments: where a triangle meets an image row, in every view at once.
+
+Technique. All cameras lie in the plane of an image row, so a triangle meets a row in one segment that is the same
+3-D line in every view. Its ends lie at x1 + o·p1 and x2 + o·p2 for camera offset o, and inverse depth and
+attributes at the ends do not depend on the view (Halle 1998 draws such lines as epipolar-plane images).
+
+What decides coverage and depth is evaluated directly from (row, x, offset) in float32, never accumulated:
+covered when x1 + o·p1 ≤ x < x2 + o·p2; t = (x − x1 − o·p1)/(x2 − x1 + o·(p2 − p1)); 1/depth = z1 + t·(z2 − z1).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .jit import inlined, kernel
+from .mesh_shade import (
+    DB, DG, DR, KB, KG, KR, NX, NY, NZ, ONE, SB, SG, SR, TS, TT, ZERO,
+    add_light, clear_sums, interpolate, locate, modulate, normalize_normals, pack,
+)
+from .mesh_texture import level_of_detail, modulate_by_texture
+
+K = [np.uint64(k) for k in range(14)]
+K0, K1, K2, K3, K4, K5, K12, K13 = K[0], K[1], K[2], K[3], K[4], K[5], K[12], K[13]
+
+
+class Surface(NamedTuple):
+    """Everything a raster kernel reads of the scene at one camera.
+
+    vertices (N, 3) float64: x at the centre camera, y, 1/depth; attributes (N, 6 or 12) float32; uv (N, 2) float64;
+    triangles (T, 4) int32: top, middle, bottom vertex, 2·face + side of the long edge; bin_start (B + 1,), bins:
+    triangles of each band, in the order of faces; face_material (F,) int32; materials (M, 8) float32: ambient,
+    diffuse, specular, shininess, two-sided, texture or −1; texels uint32; texture_levels (T, L, 3), level_count (T,).
+    """
+
+    vertices: np.ndarray
+    attributes: np.ndarray
+    uv: np.ndarray
+    triangles: np.ndarray
+    bin_start: np.ndarray
+    bins: np.ndarray
+    face_material: np.ndarray
+    materials: np.ndarray
+    texels: np.ndarray
+    texture_levels: np.ndarray
+    level_count: np.ndarray
+
+
+class Scratch(NamedTuple):
+    """One thread's own memory: band of tiles, segment ends, lists (mesh_shade), sums of sub-samples."""
+
+    band: np.ndarray
+    segment: np.ndarray
+    lists: np.ndarray
+    ints: np.ndarray
+    sums: np.ndarray
+
+
+class Lighting(NamedTuple):
+    """How to shade: lights (L, 8) float32 in eye space (kind, x, y, z, r, g, b, 0), per sample or not, own eye 1 or 0."""
+
+    lights: np.ndarray
+    per_sample: bool
+    own_eye: np.float32
+
+
+@inlined
+def cut_edge(vertices, top, bottom, y, camera):
+    """Where row y crosses an edge: x at the centre camera, 1/depth, shift per unit of offset, perspective parameter.
+
+    Always from the upper to the lower vertex, so that triangles sharing the edge get the same bits.
+    """
+    y_top, z_top = vertices[top, 1], vertices[top, 2]
+    t = (y - y_top) / (vertices[bottom, 1] - y_top)
+    x = vertices[top, 0] + t * (vertices[bottom, 0] - vertices[top, 0])
+    z = z_top + t * (vertices[bottom, 2] - z_top)
+    shift = camera.fx * (1.0 / camera.focal - z)
+    return np.float32(x), np.float32(z), np.float32(shift), np.float32(t * vertices[bottom, 2] / z)
+
+
+@inlined
+def cut_triangle(vertices, corners, y, camera):
+    """The two edges of a triangle that row y crosses, front side's left edge first.
+
+    corners = (top, middle, bottom, side of the long edge); each edge is its cut_edge values, top and bottom vertex.
+    """
+    a, b, c, odd = corners
+    top, bottom = (a, b) if y < vertices[b, 1] else (b, c)
+    x, z, p, u = cut_edge(vertices, a, c, y, camera)
+    long_edge = (x, z, p, u, a, c)
+    x, z, p, u = cut_edge(vertices, top, bottom, y, camera)
+    short_edge = (x, z, p, u, top, bottom)
+    if odd:
+        return long_edge, short_edge
+    return short_edge, long_edge
+
+
+@inlined
+def fill_segment(surface, lighting, left, right, first, columns, segment):
+    """Attributes first … first + columns at the segment's left end, and their difference to the right end."""
+    attributes = surface.attributes
+    u, a, b = left[3], left[4], left[5]
+    w, c, d = right[3], right[4], right[5]
+    for k in range(columns):
+        start = attributes[a, first + k] + u * (attributes[b, first + k] - attributes[a, first + k])
+        end = attributes[c, first + k] + w * (attributes[d, first + k] - attributes[c, first + k])
+        segment[k] = start
+        segment[16 + k] = end - start
+
+
+@inlined
+def fill_uv(surface, corners, left, right, segment):
+    """Texture coordinates at both ends, less the triangle's own whole part (levels repeat up to ±4096 times)."""
+    uv = surface.uv
+    u, a, b = left[3], left[4], left[5]
+    w, c, d = right[3], right[4], right[5]
+    for k in range(2):
+        base = np.floor(min(uv[corners[0], k], uv[corners[1], k], uv[corners[2], k]))
+        start = uv[a, k] - base + u * (uv[b, k] - uv[a, k])
+        end = uv[c, k] - base + w * (uv[d, k] - uv[c, k])
+        segment[12 + k] = np.float32(start)
+        segment[28 + k] = np.float32(end - start)
+
+
+@inlined
+def uv_gradient(surface, corners, camera):
+    """Derivatives of 1/depth and uv/depth over the picture as functions of the offset; see level_of_detail."""
+    v, uv = surface.vertices, surface.uv
+    a, b, c = corners[0], corners[1], corners[2]
+    scale = camera.fx
+    xb, xc = v[b, 0] - v[a, 0], v[c, 0] - v[a, 0]
+    pb, pc = scale * (v[a, 2] - v[b, 2]), scale * (v[a, 2] - v[c, 2])
+    yb, yc = v[b, 1] - v[a, 1], v[c, 1] - v[a, 1]
+    s0 = np.floor(min(uv[a, 0], uv[b, 0], uv[c, 0]))
+    t0 = np.floor(min(uv[a, 1], uv[b, 1], uv[c, 1]))
+    zb, zc = v[b, 2] - v[a, 2], v[c, 2] - v[a, 2]
+    sa, ta = (uv[a, 0] - s0) * v[a, 2], (uv[a, 1] - t0) * v[a, 2]
+    sb, tb = (uv[b, 0] - s0) * v[b, 2] - sa, (uv[b, 1] - t0) * v[b, 2] - ta
+    sc, tc = (uv[c, 0] - s0) * v[c, 2] - sa, (uv[c, 1] - t0) * v[c, 2] - ta
+    return (
+        np.float32(zb * yc - zc * yb), np.float32(sb * yc - sc * yb), np.float32(tb * yc - tc * yb),
+        np.float32(zc * xb - zb * xc), np.float32(sc * xb - sb * xc), np.float32(tc * xb - tb * xc),
+        np.float32(zc * pb - zb * pc), np.float32(sc * pb - sb * pc), np.float32(tc * pb - tb * pc),
+        np.float32(xb * yc - xc * yb), np.float32(pb * yc - pc * yb),
+    )
+
+
+@kernel
+def shade(n, surface, lighting, shape, scratch):
+    """Colours of a list of samples of one segment, as RGBA bytes.
+
+    shape = (material, side, row of `locate`, uv gradient).
+    """
+    m, side, row, gradient = shape
+    segment, lists, ints = scratch.segment, scratch.lists, scratch.ints
+    listed = n
+    n = (n + np.uint64(15)) & ~np.uint64(15)  # whole SIMD steps; what lies beyond the list does no harm
+    material = surface.materials[m]
+    texture = np.int64(material[5])
+    per_sample = lighting.per_sample
+    interpolate(n, segment, K0, KR, lists)
+    interpolate(n, segment, K1, KG, lists)
+    interpolate(n, segment, K2, KB, lists)
+    if texture >= 0:
+        interpolate(n, segment, K12, TS, lists)
+        interpolate(n, segment, K13, TT, lists)
+        levels = surface.texture_levels[texture, : surface.level_count[texture]]
+        level_of_detail(n, gradient, (np.float32(levels[0, 1]), np.float32(levels[0, 2])), lists)
+        modulate_by_texture(listed, surface.texels, levels, lists)
+    if per_sample:
+        interpolate(n, segment, K3, NX, lists)
+        interpolate(n, segment, K4, NY, lists)
+        interpolate(n, segment, K5, NZ, lists)
+        normalize_normals(n, ONE - np.float32(2 * side), lists)
+        clear_sums(n, lists)
+        if needs_position(material, lighting):
+            locate(n, row, lists)
+        for k in range(lighting.lights.shape[0]):
+            add_light(n, lighting.lights[k], material, (lighting.own_eye, row[4]), lists)
+        modulate(n, material[0], material[1], material[2], lists)
+    else:
+        interpolate(n, segment, K3, SR, lists)
+        interpolate(n, segment, K4, SG, lists)
+        interpolate(n, segment, K5, SB, lists)
+    pack(n, lists, ints)
+
+
+@kernel
+def needs_position(material, lighting):
+    """Whether shading per sample asks where the sample is: for highlights and point lights."""
+    if material[2] > ZERO:
+        return True
+    for k in range(lighting.lights.shape[0]):
+        if lighting.lights[k, 0] != ZERO:
+            return True
+    return False
+
+
+@inlined
+def segment_columns(surface, lighting):
+    """How many attributes a segment needs: colour and normal, or light and, if any material shines, highlight."""
+    columns = 6 if lighting.per_sample else 3
+    for m in range(surface.materials.shape[0]):
+        if surface.materials[m, 2] > ZERO:
+            columns = 6
+    return columns
+
+
+@inlined
+def is_plain(surface, lighting, m):
+    """Whether material m needs no list of samples: lit at vertices, no texture, no highlight."""
+    materials = surface.materials
+    return not (lighting.per_sample or materials[m, 5] >= ZERO or materials[m, 2] > ZERO)
+
+
+@inlined
+def row_geometry(y, camera):
+    """What `locate` needs to know of row y."""
+    slope = (0.5 * camera.height - y) / camera.fy - camera.offset_y / camera.focal
+    return (
+        np.float32(1.0 / camera.fx),
+        np.float32(0.5 * camera.width),
+        np.float32(1.0 / camera.focal),
+        np.float32(slope),
+        np.float32(camera.offset_y),
+    )
+
+
+@inlined
+def rows_of(vertices, corners, sample_y, first_row, end_row):
+    """Rows of first_row … end_row whose sample lies in top ≤ y < bottom of the triangle."""
+    top = max(vertices[corners[0], 1] - sample_y, first_row - 1.0)
+    bottom = min(vertices[corners[2], 1] - sample_y, end_row + 1.0)
+    return max(int(np.ceil(top)), first_row), min(int(np.ceil(bottom)), end_row)

@@ -1,0 +1,235 @@
+"""Before rasterising: project vertices, light them, clip at the near plane, cull, sort into bands of rows.
+
+Everything here happens once per frame for all views, in float64: image rows and depths are the same in every
+view, and x is affine in the camera offset (DESIGN section 1).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .jit import kernel
+
+LIGHT_POINT = 1.0
+
+
+class CameraNumbers(NamedTuple):
+    """The centre camera as plain numbers; see engines.engine.Camera."""
+
+    width: float
+    height: float
+    fx: float
+    fy: float
+    focal: float
+    near: float
+    offset_y: float
+
+
+@kernel
+def project_vertices(first, last, positions, eye_from_world, camera, vertices):
+    """Fill vertices[first:last] = (x at the centre camera, y, 1/depth) from world positions (N, 3)."""
+    e = eye_from_world
+    for i in range(first, last):
+        px, py, pz = positions[i, 0], positions[i, 1], positions[i, 2]
+        depth = e[2, 0] * px + e[2, 1] * py + e[2, 2] * pz + e[2, 3]
+        x = e[0, 0] * px + e[0, 1] * py + e[0, 2] * pz + e[0, 3]
+        y = e[1, 0] * px + e[1, 1] * py + e[1, 2] * pz + e[1, 3]
+        if depth < camera.near:
+            vertices[i, 0], vertices[i, 1], vertices[i, 2] = 0.0, 0.0, -1.0
+            continue
+        inverse = 1.0 / depth
+        vertices[i, 0] = 0.5 * camera.width + camera.fx * x * inverse
+        vertices[i, 1] = (
+            0.5 * camera.height - camera.fy * (y - camera.offset_y) * inverse
+            - camera.fy * camera.offset_y / camera.focal
+        )
+        vertices[i, 2] = inverse
+
+
+@kernel
+def turn_normals(first, last, normals, colors, eye_from_world, attributes):
+    """Fill attributes[first:last] = (colour, eye-space normal) for lighting per sample."""
+    e = eye_from_world
+    for i in range(first, last):
+        nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
+        for c in range(3):
+            attributes[i, c] = colors[i, c]
+            attributes[i, 3 + c] = e[c, 0] * nx + e[c, 1] * ny + e[c, 2] * nz
+
+
+@kernel
+def light_vertices(first, last, scene, eye_from_world, camera, lights, attributes):
+    """Fill attributes[first:last] with light·colour and highlight (6 columns), front then, if there, back side."""
+    e = eye_from_world
+    sides = attributes.shape[1] // 6
+    for i in range(first, last):
+        px, py, pz = scene.positions[i, 0], scene.positions[i, 1], scene.positions[i, 2]
+        nx, ny, nz = scene.normals[i, 0], scene.normals[i, 1], scene.normals[i, 2]
+        x = e[0, 0] * px + e[0, 1] * py + e[0, 2] * pz + e[0, 3]
+        y = e[1, 0] * px + e[1, 1] * py + e[1, 2] * pz + e[1, 3]
+        z = e[2, 0] * px + e[2, 1] * py + e[2, 2] * pz + e[2, 3]
+        ex = e[0, 0] * nx + e[0, 1] * ny + e[0, 2] * nz
+        ey = e[1, 0] * nx + e[1, 1] * ny + e[1, 2] * nz
+        ez = e[2, 0] * nx + e[2, 1] * ny + e[2, 2] * nz
+        vy = camera.offset_y - y
+        v = 1.0 / max(np.sqrt(x * x + vy * vy + z * z), 1e-30)
+        material = scene.materials[scene.vertex_material[i]]
+        for side in range(sides):
+            sign = 1.0 - 2.0 * side
+            dr, dg, db, sr, sg, sb = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            for k in range(lights.shape[0]):
+                lx, ly, lz = lights[k, 1], lights[k, 2], lights[k, 3]
+                if lights[k, 0] == LIGHT_POINT:
+                    lx, ly, lz = lx - x, ly - y, lz - z
+                    length = 1.0 / max(np.sqrt(lx * lx + ly * ly + lz * lz), 1e-30)
+                    lx, ly, lz = lx * length, ly * length, lz * length
+                nl = sign * (ex * lx + ey * ly + ez * lz)
+                if nl <= 0.0:
+                    continue
+                dr, dg, db = dr + lights[k, 4] * nl, dg + lights[k, 5] * nl, db + lights[k, 6] * nl
+                if material[2] > 0.0:
+                    hx, hy, hz = lx - x * v, ly + vy * v, lz - z * v
+                    h = 1.0 / max(np.sqrt(hx * hx + hy * hy + hz * hz), 1e-30)
+                    nh = max(sign * (ex * hx + ey * hy + ez * hz) * h, 0.0) ** material[3]
+                    sr, sg, sb = sr + lights[k, 4] * nh, sg + lights[k, 5] * nh, sb + lights[k, 6] * nh
+            o = 6 * side
+            attributes[i, o] = scene.colors[i, 0] * (material[0] + material[1] * dr)
+            attributes[i, o + 1] = scene.colors[i, 1] * (material[0] + material[1] * dg)
+            attributes[i, o + 2] = scene.colors[i, 2] * (material[0] + material[1] * db)
+            attributes[i, o + 3] = material[2] * sr
+            attributes[i, o + 4] = material[2] * sg
+            attributes[i, o + 5] = material[2] * sb
+
+
+@kernel
+def count_crossing(faces, vertices):
+    """Number of triangles with vertices on both sides of the near plane."""
+    crossing = 0
+    for f in range(faces.shape[0]):
+        behind = 0
+        for k in range(3):
+            behind += vertices[faces[f, k], 2] < 0.0
+        crossing += behind == 1 or behind == 2
+    return crossing
+
+
+@kernel
+def clip_near(faces, face_ids, positions, eye_from_world, camera, vertices, attributes, uv, out_faces, out_ids):
+    """Clip triangles at the near plane; new vertices go behind the first N rows of the vertex arrays.
+
+    An edge is always cut from its inner to its outer end, so that neighbours get the same new vertex.
+    Returns the number of triangles written.
+    """
+    e = eye_from_world
+    new = positions.shape[0]
+    count = 0
+    polygon = np.empty(4, np.int32)
+    for f in range(faces.shape[0]):
+        corners = 0
+        for k in range(3):
+            i, j = faces[f, k], faces[f, (k + 1) % 3]
+            i_in, j_in = vertices[i, 2] > 0.0, vertices[j, 2] > 0.0
+            if i_in:
+                polygon[corners] = i
+                corners += 1
+            if i_in != j_in:
+                if not i_in:
+                    i, j = j, i
+                ax = e[0, 0] * positions[i, 0] + e[0, 1] * positions[i, 1] + e[0, 2] * positions[i, 2] + e[0, 3]
+                ay = e[1, 0] * positions[i, 0] + e[1, 1] * positions[i, 1] + e[1, 2] * positions[i, 2] + e[1, 3]
+                ad = e[2, 0] * positions[i, 0] + e[2, 1] * positions[i, 1] + e[2, 2] * positions[i, 2] + e[2, 3]
+                bx = e[0, 0] * positions[j, 0] + e[0, 1] * positions[j, 1] + e[0, 2] * positions[j, 2] + e[0, 3]
+                by = e[1, 0] * positions[j, 0] + e[1, 1] * positions[j, 1] + e[1, 2] * positions[j, 2] + e[1, 3]
+                bd = e[2, 0] * positions[j, 0] + e[2, 1] * positions[j, 1] + e[2, 2] * positions[j, 2] + e[2, 3]
+                t = (ad - camera.near) / (ad - bd)
+                inverse = 1.0 / camera.near
+                x, y = ax + t * (bx - ax), ay + t * (by - ay)
+                vertices[new, 0] = 0.5 * camera.width + camera.fx * x * inverse
+                vertices[new, 1] = (
+                    0.5 * camera.height - camera.fy * (y - camera.offset_y) * inverse
+                    - camera.fy * camera.offset_y / camera.focal
+                )
+                vertices[new, 2] = inverse
+                for c in range(attributes.shape[1]):
+                    attributes[new, c] = attributes[i, c] + t * (attributes[j, c] - attributes[i, c])
+                for c in range(uv.shape[1]):
+                    uv[new, c] = uv[i, c] + t * (uv[j, c] - uv[i, c])
+                polygon[corners] = new
+                corners += 1
+                new += 1
+        for k in range(1, corners - 1):
+            out_faces[count, 0], out_faces[count, 1], out_faces[count, 2] = polygon[0], polygon[k], polygon[k + 1]
+            out_ids[count] = face_ids[f]
+            count += 1
+    return count
+
+
+@kernel
+def cull_and_count(chunk, faces, face_ids, vertices, scene, camera, span, bands, out, counts):
+    """Keep the triangles of one chunk that some view may see, and count them per band.
+
+    out[k] = (top, middle, bottom vertex, 2·face + side of the long edge); the triangles of chunk
+    (first, last) are written from out[first] on, in the order of faces. counts[band] is increased.
+
+    Culling is conservative over all camera offsets in `span`: x is affine and the signed area too, so both
+    ends of the span decide. Returns the number kept.
+    """
+    first, last = chunk
+    rows_per_band, first_sample, last_sample = bands
+    kept = first
+    scale = camera.fx
+    for f in range(first, last):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        ya, yb, yc = vertices[a, 1], vertices[b, 1], vertices[c, 1]
+        top, bottom = min(ya, yb, yc), max(ya, yb, yc)
+        row0 = max(np.ceil(top - last_sample), 0.0)
+        row1 = min(np.ceil(bottom - first_sample), camera.height)
+        if not row0 < row1:
+            continue
+        xa, xb, xc = vertices[a, 0], vertices[b, 0], vertices[c, 0]
+        pa = scale * (1.0 / camera.focal - vertices[a, 2])
+        pb = scale * (1.0 / camera.focal - vertices[b, 2])
+        pc = scale * (1.0 / camera.focal - vertices[c, 2])
+        left, right = np.inf, -np.inf
+        facing = 0
+        for end in range(2):
+            o = span[end]
+            xa_o, xb_o, xc_o = xa + o * pa, xb + o * pb, xc + o * pc
+            left = min(left, xa_o, xb_o, xc_o)
+            right = max(right, xa_o, xb_o, xc_o)
+            area = (xb_o - xa_o) * (yc - ya) - (xc_o - xa_o) * (yb - ya)
+            facing += area > 1e-3 * (bottom - top)  # rows run downwards: positive is a back side
+        margin = 1.0 + 1e-6 * (abs(left) + abs(right))
+        if right < -margin or left > camera.width + margin:
+            continue
+        face = face_ids[f]
+        if facing == 2 and scene.materials[scene.face_material[face], 4] == 0.0:
+            continue
+        # sort by y; an odd permutation mirrors the triangle
+        odd = 0
+        if yb < ya:
+            a, b, ya, yb, odd = b, a, yb, ya, 1 - odd
+        if yc < yb:
+            b, c, yb, yc, odd = c, b, yc, yb, 1 - odd
+        if yb < ya:
+            a, b, ya, yb, odd = b, a, yb, ya, 1 - odd
+        out[kept, 0], out[kept, 1], out[kept, 2], out[kept, 3] = a, b, c, 2 * face + odd
+        kept += 1
+        band0, band1 = int(row0) // rows_per_band, (int(row1) - 1) // rows_per_band
+        for band in range(band0, band1 + 1):
+            counts[band] += 1
+    return kept - first
+
+
+@kernel
+def fill_bins(first, count, triangles, vertices, height, bands, cursor, bins):
+    """Write the indices of triangles first…first+count into the bins of their bands, from cursor[band] on."""
+    rows_per_band, first_sample, last_sample = bands
+    for k in range(first, first + count):
+        row0 = max(np.ceil(vertices[triangles[k, 0], 1] - last_sample), 0.0)
+        row1 = min(np.ceil(vertices[triangles[k, 2], 1] - first_sample), height)
+        for band in range(int(row0) // rows_per_band, (int(row1) - 1) // rows_per_band + 1):
+            bins[cursor[band]] = k
+            cursor[band] += 1

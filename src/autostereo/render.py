@@ -1,0 +1,302 @@
+"""The one door: pick a method, pick an engine, go."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import methods
+from .display.display import Display
+from .display.optics import wanted_phase
+from .display.rig import Rig
+from .encoders.rgbd import disparity_map, wowvx
+from .encoders.stereo import pack
+from .engines.engine import Camera, Draw, Target, get_engine
+from .engines.options import Options
+from .errors import InputError, MemoryLimitError, UnsupportedError
+from .frame import Panel, ViewStack
+from .scene.scene import Scene
+
+MAX_SIDE = 65536
+MAX_VIEWS = 4096
+
+
+def render(
+    scene: Any, display: Display, rig: Rig | None = None, *, method: str = "single-pass", engine: str = "auto",
+    options: Options | None = None,
+) -> Panel:
+    """Render the picture that a display's panel shows.
+
+    Parameters
+    ----------
+    scene : Scene, object or sequence of objects
+    display : Display
+    rig : Rig, optional
+        Cameras; the display's number of views is spread over its baseline. None: `Rig.frame(scene, display)`.
+    method : {"single-pass", "n-pass", "n-pass-subres"}
+    engine : {"auto", "cpu", "reference"}
+    options : Options, optional
+
+    Returns
+    -------
+    Panel
+        pixels (H, W, 3) uint8.
+
+    Raises
+    ------
+    AutostereoError
+        Bad input, a method the engine lacks, or more memory than the machine has.
+    """
+    return Renderer(scene, engine).render(display, rig, method=method, options=options)
+
+
+def render_views(
+    scene: Any, rig: Rig, size: tuple[int, int] = (512, 512), *, method: str = "single-pass", engine: str = "auto",
+    options: Options | None = None,
+) -> ViewStack:
+    """Render a stack of views; size = (width, height) of each. See `render` for the rest.
+
+    Returns
+    -------
+    ViewStack
+        color (V, H, W, 4) uint8 and, if asked for in the options, depth (V, H, W) float32.
+    """
+    return Renderer(scene, engine).render_views(rig, size, method=method, options=options)
+
+
+class Renderer:
+    """A scene made ready once, to render it many times; it keeps prepared data and buffers between frames.
+
+    Arrays that it returns are valid until its next frame of the same kind: copy what must stay.
+
+    Parameters
+    ----------
+    scene : Scene, object or sequence of objects
+    engine : {"auto", "cpu", "reference"}
+    """
+
+    def __init__(self, scene: Any, engine: str = "auto") -> None:
+        self.scene = Scene.of(scene)
+        self.engine = get_engine(engine)
+        self._prepared = self.engine.prepare(self.scene)
+        self._held: dict[str, NDArray[Any]] = {}
+
+    def render(
+        self, display: Display, rig: Rig | None = None, *, method: str = "single-pass", options: Options | None = None,
+        out: NDArray[np.uint8] | None = None,
+    ) -> Panel:
+        """Render a panel; `out` (H, W, 3) uint8 may be given to hold it. See the function `render`."""
+        options = options or Options()
+        schedule = methods.get_method(method, self.engine)
+        rig = (rig or Rig.frame(self.scene, display)).with_views(display.views)
+        if display.viewmap is None:
+            return self._render_packed(display, rig, method, options, out)
+        size = (display.width, display.height)
+        camera = make_camera(rig, size)
+        check_in_view(self.scene, rig)
+        target = Target(self._array("panel", out, (size[1], size[0], 3), np.uint8))
+        offsets = rig.camera_offsets
+        draw = Draw(
+            camera, offsets, culling_range(rig, display), display.viewmap, display.flip_x, display.flip_y, options
+        )
+        schedule.draw_panel(self.engine, self._prepared, draw, target)
+        return Panel(target.color, share(target, options))
+
+    def render_views(
+        self, rig: Rig, size: tuple[int, int] = (512, 512), *, method: str = "single-pass",
+        options: Options | None = None, out: NDArray[np.uint8] | None = None,
+    ) -> ViewStack:
+        """Render a stack of views; `out` (V, H, W, 4) uint8 may be given to hold it. See the function `render_views`."""
+        options = options or Options()
+        schedule = methods.get_method(method, self.engine)
+        camera = make_camera(rig, size)
+        check_in_view(self.scene, rig)
+        offsets = rig.camera_offsets
+        shape = (len(offsets), camera.height, camera.width)
+        target = Target(self._array("views", out, (*shape, 4), np.uint8))
+        if options.depth:
+            target.depth = self._array("depth", None, shape, np.float32)
+        draw = Draw(camera, offsets, culling_range(rig), options=options)
+        schedule.draw_views(self.engine, self._prepared, draw, target)
+        return ViewStack(target.color, target.depth, share(target, options))
+
+    def update(self, transform: Any = None) -> None:
+        """Give the scene's objects a new world_from_object transform (one for all, or one each) for the next frame."""
+        objects = self.scene.objects
+        given = np.asarray(transform, dtype=np.float64)
+        each = [given] * len(objects) if given.ndim == 2 else list(given)
+        if len(each) != len(objects):
+            raise InputError(f"transform: expected one (4, 4) matrix or {len(objects)} of them, got {given.shape}")
+        moved = tuple(replace(item, transform=matrix) for item, matrix in zip(objects, each, strict=True))
+        self.scene = replace(self.scene, objects=moved)
+        self._prepared = self.engine.prepare(self.scene)
+
+    def _array(self, name: str, out: Any, shape: tuple[int, ...], dtype: type) -> NDArray[Any]:
+        """The array to draw into: the caller's, or one kept from frame to frame."""
+        if out is not None:
+            if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != dtype or not out.flags.c_contiguous:
+                raise InputError(f"out: expected a contiguous {np.dtype(dtype)} array of shape {shape}")
+            return out
+        held = self._held.get(name)
+        if held is None or held.shape != shape:
+            check_memory(int(np.prod([int(n) for n in shape])) * np.dtype(dtype).itemsize, describe(shape))
+            self._held.pop(name, None)
+            held = self._held[name] = np.empty(shape, dtype)
+        return held
+
+    def _render_packed(
+        self, display: Display, rig: Rig, method: str, options: Options, out: NDArray[np.uint8] | None
+    ) -> Panel:
+        """Pictures for displays without a mask: packed views, anaglyph, 2D + depth."""
+        rig = replace(rig, aspect=rig.aspect or display.aspect)
+        options = replace(options, depth=display.layout == "rgbd")
+        stack = self.render_views(rig, display.view_size, method=method, options=options)
+        if display.layout == "rgbd":
+            assert stack.depth is not None
+            scale = make_camera(rig, display.view_size).fx * rig.baseline / 8  # as adjacent views of a panel of 9
+            disparity = disparity_map(stack.depth[0], rig.focal, scale, display.comfort)
+            pixels = wowvx(stack.color[0], disparity, anamorphic=True)
+        else:
+            pixels = pack(stack.color, display.layout, swap=display.eyes_swapped, anamorphic=True)
+        if out is not None:
+            self._array("packed", out, pixels.shape, np.uint8)[...] = pixels
+        return Panel(pixels if out is None else out, stack.reused)
+
+
+def interlace(views: ViewStack, display: Display) -> Panel:
+    """Gather the panel's picture from a stack of its V views at the panel's size.
+
+    A continuous display's camera coordinate is rounded to the nearest view.
+    """
+    if display.viewmap is None:
+        raise UnsupportedError(f"{display.name}: a {display.layout} picture has no mask to interlace by")
+    if (views.width, views.height) != (display.width, display.height) or views.views != display.views:
+        raise InputError(
+            f"views: expected {display.views} of {display.width}×{display.height} for {display.name}, "
+            f"got {views.views} of {views.width}×{views.height}"
+        )
+    from .engines.cpu import gather
+
+    pixels = np.empty((display.height, display.width, 3), np.uint8)
+    gather.interlace(views.color, display.viewmap, display.flip_x, display.flip_y, pixels)
+    return Panel(pixels)
+
+
+def observe(
+    panel: Panel, display: Display, view: float | None = None, *, eye: tuple[float, float] | None = None,
+    crosstalk: float = 0.0,
+) -> NDArray[np.uint8]:
+    """What an eye sees of the panel through its optics.
+
+    Parameters
+    ----------
+    panel : Panel
+    display : Display
+    view : float, optional
+        Camera coordinate u of the zone the eye is in.
+    eye : (x, z), optional
+        Where the eye is instead, in mm from the panel's centre; needs `display.physical(size_mm=…)`.
+    crosstalk : float
+        Share of light, 0 ≤ … < 1, from the neighbouring zones.
+
+    Returns
+    -------
+    ndarray of shape (H, W, 3), uint8
+        At each pixel and channel the sub-pixel that its lens shows to the eye.
+    """
+    if display.viewmap is None:
+        raise UnsupportedError(f"{display.name}: a {display.layout} picture is not seen through lenses")
+    if panel.pixels.shape[:2] != (display.height, display.width):
+        raise InputError(
+            f"panel: expected {display.width}×{display.height} pixels for {display.name}, "
+            f"got {panel.width}×{panel.height}"
+        )
+    from .engines.cpu.observe import observe as look
+
+    wanted = wanted_phase(display, view=view, eye=eye)
+    return look(
+        panel.pixels, display.viewmap, wanted, crosstalk=crosstalk, flips=(display.flip_x, display.flip_y)
+    )
+
+
+def make_camera(rig: Rig, size: tuple[int, int]) -> Camera:
+    """The centre camera of a rig for pictures of `size` = (width, height)."""
+    width, height = check_size(size)
+    half = np.tan(np.deg2rad(rig.fov_y) / 2)
+    fy = height / 2 / half
+    aspect = rig.aspect if rig.aspect is not None else width / height
+    fx = width / 2 / (aspect * half)
+    return Camera(rig.eye_from_world, float(fx), float(fy), width, height, rig.focal, rig.near_depth, rig.offset_y)
+
+
+def check_size(size: Any) -> tuple[int, int]:
+    """Return (width, height) as whole numbers within limits, or raise InputError."""
+    try:
+        width, height = size
+    except (TypeError, ValueError):
+        raise InputError(f"size: expected (width, height), got {size!r}") from None
+    for number in (width, height):
+        if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or not 1 <= number <= MAX_SIDE:
+            raise InputError(f"size: expected whole numbers 1…{MAX_SIDE}, got {width!r}×{height!r}")
+    return int(width), int(height)
+
+
+def culling_range(rig: Rig, display: Display | None = None) -> tuple[float, float]:
+    """Least and greatest camera offset that a draw may use; a continuous panel reaches half a view beyond the ends."""
+    if display is not None and display.continuous:
+        low, high = rig.offset_at(np.array([-0.5, rig.views - 0.5]))
+        return float(low), float(high)
+    offsets = rig.camera_offsets
+    return float(offsets[0]), float(offsets[-1])
+
+
+def check_in_view(scene: Scene, rig: Rig) -> None:
+    """Raise InputError when the whole scene lies behind the cameras."""
+    bounds = scene.bounds
+    corners = np.array([[bounds[i, 0], bounds[j, 1], bounds[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    depth = corners @ rig.eye_from_world[2, :3] + rig.eye_from_world[2, 3]
+    if depth.max() < rig.near_depth:
+        raise InputError(
+            f"rig: the scene lies behind the cameras (its farthest point is at depth {depth.max():.4g}, "
+            f"the near plane at {rig.near_depth:.4g}); move `position` or turn `target`"
+        )
+
+
+def share(target: Target, options: Options) -> float | None:
+    """Share of samples whose colour was reused, when that was asked for."""
+    if options.shading != "reuse":
+        return None
+    return target.reused / target.covered if target.covered else 0.0
+
+
+def describe(shape: tuple[int, ...]) -> str:
+    """A picture's shape in words."""
+    if len(shape) == 3 and shape[2] == 3:
+        return f"a panel of {shape[1]}×{shape[0]} pixels"
+    return f"{shape[0]} views of {shape[2]}×{shape[1]} pixels"
+
+
+def check_memory(need: int, what: str) -> None:
+    """Raise MemoryLimitError when `need` bytes are more than the machine has free."""
+    free = available_memory()
+    if free is not None and need > 0.9 * free:
+        raise MemoryLimitError(f"{what} would take {need / 1e9:.1f} GB of memory, and {free / 1e9:.1f} GB are free")
+
+
+def available_memory() -> int | None:
+    """Bytes of memory that a process may still take, where the system tells."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as file:
+            for line in file:
+                if line.startswith("MemAvailable:"):
+                    return int(line.split()[1]) * 1024
+    except OSError:
+        pass
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return None
