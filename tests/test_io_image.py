@@ -44,6 +44,15 @@ def test_weld_numbers_distinct_rows_in_order_of_appearance(rows):
     assert [rows[k] for k in first] == distinct and group.tolist() == [distinct.index(row) for row in rows]
 
 
+@pytest.mark.parametrize("high", [3, 10**4, 10**15])
+def test_weld_of_many_rows(high):
+    rows = np.random.default_rng(4).integers(-high, high, (3000, 3)).repeat(2, axis=0)[::-1]
+    first, group = weld(*rows.T)
+    assert (np.diff(first) > 0).all() and len(first) == len(np.unique(rows, axis=0))
+    np.testing.assert_array_equal(rows[first[group]], rows)
+    np.testing.assert_array_equal(group[first], np.arange(len(first)))
+
+
 # --- pictures ------------------------------------------------------------------------------------------
 
 

@@ -191,18 +191,8 @@ def _corners(text: _Text, sizes: tuple[int, int, int], path: PathLike) -> tuple[
     """Corners of each face (P,), and v, vt, vn of every corner (C, 3) counted from 0; −1: not given."""
     faces = _words(text.f)
     counts = np.array([len(words) for words in faces], dtype=np.int64)
-    joined = b" ".join([word for words in faces for word in words])
-    # v//n and v/ leave an index out: 0 stands for it, no index is 0
-    filled = joined.replace(b"//", b"/0/").replace(b"/ ", b"/0 ") + (b"0" if joined.endswith(b"/") else b"")
-    raw = np.frombuffer(filled, np.uint8)
-    token = np.cumsum(raw == ord(" "))
-    given = np.bincount(token[raw == ord("/")], minlength=int(counts.sum())) + 1 if len(raw) else counts[:0]
-    values = whole_numbers(filled.replace(b"/", b" ").split(), path, "face indices")
-    if len(values) != given.sum() or given.max(initial=1) > 3:
-        raise FileError(f"{path}: expected face corners of the form v, v/vt, v//vn or v/vt/vn")
-    corners = np.zeros((len(given), 3), dtype=np.int64)
-    corner = np.repeat(np.arange(len(given)), given)
-    corners[corner, np.arange(len(values)) - np.repeat(np.cumsum(given) - given, given)] = values
+    words = [word for face in faces for word in face]
+    corners = _corner_indices(words, path)
     if (corners[:, 0] == 0).any():
         raise FileError(f"{path}: found vertex 0 in a face, OBJ counts from 1")
     if (corners < 0).any():  # relative to what is defined by then
@@ -216,6 +206,26 @@ def _corners(text: _Text, sizes: tuple[int, int, int], path: PathLike) -> tuple[
         if corners[:, k].max(initial=0) > sizes[k]:
             raise FileError(f"{path}: a face asks for {what} {corners[:, k].max()}, the file has {sizes[k]}")
     return counts, corners - 1
+
+
+def _corner_indices(words: list[bytes], path: PathLike) -> NDArray[np.int64]:
+    """Indices v, vt, vn (C, 3) as written in words v, v/vt, v//vn or v/vt/vn; 0: not given."""
+    corners = np.zeros((len(words), 3), dtype=np.int64)
+    joined = b" ".join(words)
+    if b"/" not in joined:
+        corners[:, 0] = whole_numbers(words, path, "face indices")
+        return corners
+    # v//n and v/ leave an index out: 0 stands for it, no index is 0
+    filled = joined.replace(b"//", b"/0/").replace(b"/ ", b"/0 ") + (b"0" if joined.endswith(b"/") else b"")
+    raw = np.frombuffer(filled, np.uint8)
+    marks = raw[(raw == ord(" ")) | (raw == ord("/"))]
+    given = np.bincount(np.cumsum(marks == ord(" "))[marks == ord("/")], minlength=len(words)) + 1
+    values = whole_numbers(filled.replace(b"/", b" ").split(), path, "face indices")
+    if len(values) != given.sum() or given.max() > 3:
+        raise FileError(f"{path}: expected face corners of the form v, v/vt, v//vn or v/vt/vn")
+    corner = np.repeat(np.arange(len(words)), given)
+    corners[corner, np.arange(len(values)) - np.repeat(np.cumsum(given) - given, given)] = values
+    return corners
 
 
 def _parts(text: _Text, n_faces: int) -> tuple[list[bytes], NDArray[np.int64]]:
