@@ -112,6 +112,13 @@ def test_every_public_name_exists() -> None:
     assert sorted(autostereo.__all__) == dir(autostereo)
 
 
+@pytest.mark.parametrize("first", ["from autostereo.render import Renderer", "aus.Renderer", "aus.render"])
+def test_render_stays_a_function(first: str) -> None:
+    """The module autostereo.render never hides the function autostereo.render."""
+    code = f"import autostereo as aus\n{first}\nassert callable(aus.render), aus.render\n"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
 def test_one_version_number() -> None:
     """The version stands in __init__.py; CITATION.cff repeats it and must agree."""
     import autostereo

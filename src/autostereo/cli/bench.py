@@ -16,7 +16,7 @@ BENCHES = ("mesh",)
 def bench(
     name: Annotated[str, typer.Argument(metavar="WHAT", help="What to measure: mesh.")] = "mesh",
     json: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Also write the figures here.")] = None,
-    only: Annotated[list[str] | None, typer.Option("--only", metavar="WORK", help="This work only; repeatable.")] = None,
+    only: Annotated[list[str] | None, typer.Option("--only", metavar="WORK", help="Only this; repeatable.")] = None,
     data: Annotated[
         Path | None, typer.Option("--data", metavar="DIR", help="Folder with meshes/bun_zipper.ply (Stanford bunny).")
     ] = None,

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from ..display.rig import Rig
     from ..scene.scene import Scene
 
-MAX_SIDE = 65_535  # of a picture; the largest that common formats can hold
-MAX_VIEWS = 65_535
+MAX_SIDE = 32_768  # what a Display takes
+MAX_VIEWS = 4_096
 
 
 class State:
@@ -146,6 +146,13 @@ def check_output(path: Path, suffixes: tuple[str, ...] = ()) -> Path:
     return path
 
 
+def check_image(path: Path) -> Path:
+    """The same for an image file."""
+    from ..image import IMAGE_SUFFIXES
+
+    return check_output(path, IMAGE_SUFFIXES)
+
+
 @contextmanager
 def whole_folder(path: Path, stale: str = "") -> Iterator[Path]:
     """Give a temporary folder to fill; when all went well its files appear in `path`, else nothing does.
@@ -153,7 +160,7 @@ def whole_folder(path: Path, stale: str = "") -> Iterator[Path]:
     In a folder that exists, files of the same name are replaced, and others that match the pattern `stale` removed.
     """
     check_output(path)
-    temporary = path.parent / f".{path.name}.{secrets.token_hex(4)}.part"
+    temporary = path.parent / f".part-{secrets.token_hex(4)}"  # no suffix: it is a folder
     try:
         temporary.mkdir()
         yield temporary
@@ -209,10 +216,9 @@ def announce_compilation(engine: str) -> None:
     """Say so when this is the run that compiles the kernels."""
     if engine not in ("auto", "cpu"):
         return
-    from ..engines.cpu import engine as cpu
+    from ..engines.cpu.jit import is_compiled
 
-    is_compiled = getattr(cpu, "is_compiled", None)
-    if is_compiled is not None and not is_compiled():
+    if not is_compiled():
         note("compiling kernels (once, up to a minute)…")
 
 

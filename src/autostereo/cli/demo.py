@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from html import escape
@@ -14,6 +15,8 @@ from . import common
 from .common import say
 
 if TYPE_CHECKING:
+    from ..display.display import Display
+    from ..display.rig import Rig
     from ..render import Renderer
     from ..scene.scene import Scene
 
@@ -22,7 +25,7 @@ Captions = list[tuple[str, str]]  # (file name, what it shows)
 PORTRAIT = "looking-glass-portrait"
 WIDE = (1280, 720)
 TILE = (252, 336)  # of the quilt and the animation: large enough to look at, small enough to be quick
-LEFT, RIGHT = 16.0, 31.0  # zones of the Portrait's 48 in which the two eyes of a viewer are
+EYES = {"left": (-31.5, 500.0), "right": (31.5, 500.0)}  # mm to the right and in front of the panel
 
 
 def demo(
@@ -54,8 +57,25 @@ def demo(
                 advance()
         (folder / "index.html").write_text(page(captions), encoding="utf-8")
     for name, caption in captions:
-        say(f"{output / name}  {caption.split('.')[0]}")
+        say(f"{output / name}  {caption.split('. ')[0].rstrip('.')}")
     say(f"{output / 'index.html'}  all of them, explained")
+
+
+def choose_rig(scene: Scene, display: Display) -> Rig:
+    """Cameras a little above the objects, as far apart as the display's comfort and cone allow.
+
+    `Rig.frame` would show the whole floor; here it may leave the picture.
+    """
+    from ..display.framing import depth_budget
+    from ..display.rig import Rig
+
+    fov_y = 23.0 if display.aspect > 1 else 38.0
+    place = {"position": (0.0, 2.6, 9.0), "target": (-0.05, -0.2, -0.3)}
+    rig = Rig(**place, fov_y=fov_y, baseline=1.0, views=display.views, aspect=display.aspect)  # type: ignore[arg-type]
+    budget = depth_budget(replace(scene, objects=scene.objects[1:]), display, rig)
+    comfortable = display.comfort / max(abs(budget.disparity_near), abs(budget.disparity_far))
+    cone = 2 * rig.focal * math.tan(math.radians(display.cone_deg) / 2)
+    return replace(rig, baseline=min(comfortable, cone))
 
 
 def _portrait(renderer: Renderer, scene: Scene, folder: Path) -> Captions:
@@ -65,15 +85,15 @@ def _portrait(renderer: Renderer, scene: Scene, folder: Path) -> Captions:
     from ..render import observe
 
     display = Display.preset(PORTRAIT)
-    panel = renderer.render(display)
+    panel = renderer.render(display, choose_rig(scene, display))
     panel.save(folder / f"panel_{PORTRAIT}.png")
-    for name, zone in (("left", LEFT), ("right", RIGHT)):
-        write_image(folder / f"eye_{name}.png", observe(panel, display, view=zone))
-    seen = "what the {} eye sees of it through the lenses, computed from that panel alone (zone {:g} of 48)"
+    for name, eye in EYES.items():
+        write_image(folder / f"eye_{name}.png", observe(panel, display, eye=eye))
+    seen = "what the {} eye sees of it. Computed from that panel alone through its lenses, from half a metre away"
     return [
         (f"panel_{PORTRAIT}.png", "Looking Glass Portrait, the interlaced panel. Each sub-pixel is from its own view."),
-        ("eye_left.png", f"Looking Glass Portrait, {seen.format('left', LEFT)}."),
-        ("eye_right.png", f"Looking Glass Portrait, {seen.format('right', RIGHT)}."),
+        ("eye_left.png", f"Looking Glass Portrait, {seen.format('left')}."),
+        ("eye_right.png", f"Looking Glass Portrait, {seen.format('right')}."),
     ]
 
 
@@ -94,7 +114,7 @@ def _panels(renderer: Renderer, scene: Scene, folder: Path) -> Captions:
     ]
     captions: Captions = []
     for name, display, caption in displays:
-        renderer.render(display).save(folder / f"panel_{name}.png")
+        renderer.render(display, choose_rig(scene, display)).save(folder / f"panel_{name}.png")
         captions.append((f"panel_{name}.png", caption))
     return captions
 
@@ -103,14 +123,13 @@ def _views(renderer: Renderer, scene: Scene, folder: Path) -> Captions:
     """A quilt, and the same views as an animation."""
     from ..display.display import Display
     from ..display.quilt import Quilt
-    from ..display.rig import Rig
     from ..encoders.quilt import quilt_path, save_quilt
     from ..encoders.video import save_animation
     from ..frame import ViewStack
 
     columns, rows = 8, 6
     layout = Quilt(columns, rows, columns * TILE[0], rows * TILE[1], TILE[0] / TILE[1])
-    rig = Rig.frame(scene, replace(Display.preset(PORTRAIT), quilt=layout))
+    rig = choose_rig(scene, replace(Display.preset(PORTRAIT), quilt=layout))
     stack = renderer.render_views(rig, TILE)
     path = save_quilt(quilt_path(folder / "quilt.png", layout), stack, layout)
     for suffix in ("webp", "gif"):

@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from ..image import IMAGE_SUFFIXES
 from . import common
 from .common import say
 
@@ -40,12 +39,15 @@ def observe(
     """
     if (view is None) == (eye is None):
         raise InputError("observe: expected either --view U or --eye X,Z")
-    place = None if eye is None else common.parse_numbers(eye, "--eye", 2)
-    common.check_output(output, IMAGE_SUFFIXES)
+    place = None
+    if eye is not None:
+        x, z = common.parse_numbers(eye, "--eye", 2)
+        place = (x, z)
+    common.check_image(output)
     where = common.load_display(display, None, swap, views, continuous)
     pixels = common.load_picture(panel)
     width, height = where.picture_size
-    if pixels.shape[:2] != (height, width):
+    if pixels.shape[:2] != (height, width) and where.viewmap is not None:
         where = where.resized(pixels.shape[1], pixels.shape[0])
     from ..frame import Panel
     from ..image import write_image

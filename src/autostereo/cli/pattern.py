@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError
-from ..image import IMAGE_SUFFIXES
 from . import common
 from .common import note, say
 
@@ -69,7 +68,7 @@ def pattern(
     if step is not None and not 0 < abs(step) * strips < 2:
         raise InputError(f"--step: expected a small number other than 0, got {step:g}")
     where = common.load_display(display, size, swap, views)
-    common.check_output(output, IMAGE_SUFFIXES)
+    common.check_image(output)
     with common.working("drawing"):
         if kind in STEPS:
             sweep = make_sweep(where, kind, strips, width)
@@ -157,14 +156,12 @@ def _spread_packed(display: Display, pictures: NDArray[np.uint8]) -> NDArray[np.
         raise InputError(f"{display.name}: a {display.layout} picture has no views to tell apart")
     import numpy as np
 
-    from ..frame import ViewStack
-    from ..render import interlace
+    from ..encoders.stereo import pack
 
-    count, h, w, _ = pictures.shape
+    _, h, w, _ = pictures.shape
     width, height = display.view_size
-    color = np.full((count, height, width, 4), 255, dtype=np.uint8)
-    color[..., :3] = pictures[:, (np.arange(height) * h // height)[:, None], np.arange(width) * w // width]
-    return interlace(ViewStack(color), display).pixels
+    y, x = np.arange(height) * h // height, np.arange(width) * w // width
+    return pack(pictures[:, y[:, None], x], display.layout, swap=display.eyes_swapped, anamorphic=True)
 
 
 # --- strips ----------------------------------------------------------------------------------------------------------

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import InputError
-from ..image import IMAGE_SUFFIXES
 from . import common
 from .common import say
 
@@ -57,7 +56,7 @@ def quilt(
     rig = common.load_camera(camera)
     from ..encoders.quilt import quilt_path
 
-    path = common.check_output(quilt_path(output or Path(f"{inputs[0].stem}.png"), layout), IMAGE_SUFFIXES)
+    path = common.check_image(quilt_path(output or Path(f"{inputs[0].stem}.png"), layout))
     scene = common.load_scene(inputs, background)
     rig = _frame(scene, where, layout) if rig is None else rig.with_views(layout.views)
     if rig.aspect is None:
@@ -76,6 +75,7 @@ def quilt(
 def choose_layout(display: Display | None, grid: str | None, view_size: str | None, aspect: float | None) -> Quilt:
     """Return the display's own quilt, with what the options change, or the one they describe."""
     from ..display.quilt import Quilt
+    from ..encoders.quilt import MAX_PIXELS, MAX_TILES
 
     own = None if display is None else display.quilt
     if own is None and (grid is None or view_size is None):
@@ -83,8 +83,11 @@ def choose_layout(display: Display | None, grid: str | None, view_size: str | No
         raise InputError(f"quilt: {name}: expected --grid CxR and --view-size WxH")
     if own is not None and grid is None and view_size is None:
         return own if aspect is None else replace(own, aspect=aspect)
-    columns, rows = common.parse_pair(grid, "--grid", 1024) if grid else (own.columns, own.rows)  # type: ignore[union-attr]
+    columns, rows = common.parse_pair(grid, "--grid", MAX_TILES) if grid else (own.columns, own.rows)  # type: ignore[union-attr]
     width, height = common.parse_size(view_size, "--view-size") if view_size else own.tile  # type: ignore[union-attr]
+    if max(columns * width, rows * height) > MAX_PIXELS:
+        wanted = f"{columns * width}×{rows * height}"
+        raise InputError(f"quilt: expected at most {MAX_PIXELS} pixels a side, {columns}×{rows} tiles make {wanted}")
     if aspect is None:
         aspect = width / height if display is None else display.aspect
     return Quilt(columns, rows, columns * width, rows * height, aspect)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from time import perf_counter
 
-from ..image import IMAGE_SUFFIXES
 from . import common
 from .common import note, say
 
@@ -44,7 +43,7 @@ def render(
     where = common.load_display(display, size, swap, views, continuous)
     options = Options(shading=shading, lighting=lighting, sampling=sampling, samples=samples)
     rig = common.load_camera(camera)
-    path = common.check_output(output or Path(f"{inputs[0].stem}_{common.slug(display)}.png"), IMAGE_SUFFIXES)
+    path = common.check_image(output or Path(f"{inputs[0].stem}_{common.slug(display)}.png"))
     scene = common.load_scene(inputs, background)
 
     from ..render import render as draw

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..errors import InputError
+from ..errors import DependencyError, InputError
 from . import common
 from .common import say
 
@@ -43,6 +43,7 @@ def views(
       autostereo views bunny.ply -o bunny.npz --depth --camera rig.json
     """
     suffix = output.suffix.lower()
+    shape = common.parse_size(size) if size else (512, 512)
     if suffix not in ("", ".npz", *ANIMATIONS):
         raise InputError(f"{output}: expected a folder, or a name ending in .npz {' '.join(ANIMATIONS)}, got {suffix}")
     if depth and suffix != ".npz":
@@ -50,9 +51,10 @@ def views(
     from ..engines.options import Options
 
     common.check_views(views)
+    if suffix in ANIMATIONS:
+        check_animation(output, shape)
     options = Options(shading=shading, lighting=lighting, samples=samples, depth=depth)
     rig = common.load_camera(camera)
-    shape = common.parse_size(size) if size else (512, 512)
     common.check_output(output, (suffix,) if suffix else ())
     scene = common.load_scene(inputs, background)
     rig = common.frame_views(scene, rig, views, shape, display)
@@ -74,3 +76,16 @@ def views(
                 stack.save(folder)
                 rig.save(folder / "rig.json")
     say(f"{output}  {rig.views} views of {shape[0]}×{shape[1]}")
+
+
+def check_animation(path: Path, size: tuple[int, int]) -> None:
+    """Refuse, before the long work, an animation that could not be written after it."""
+    from importlib.util import find_spec
+
+    from ..encoders.video import MAX_SIDE
+
+    limit = MAX_SIDE[path.suffix.lower()]
+    if max(size) > limit:
+        raise InputError(f"{path}: {path.suffix} takes at most {limit} pixels a side, got {size[0]}×{size[1]}")
+    if path.suffix.lower() == ".mp4" and find_spec("av") is None:
+        raise DependencyError(f"{path}: mp4 needs PyAV; pip install autostereo[video]")

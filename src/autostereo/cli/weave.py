@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from ..image import IMAGE_SUFFIXES
 from . import common
 from .common import say
 
@@ -47,15 +46,17 @@ def weave(
         raise InputError(f"{quilt}: the name does not say how many tiles (…_qs8x6a0.75.png); give --grid 8x6")
     where = common.load_display(display, size, swap, None, continuous)
     common.check_views(views)
+    if where.viewmap is not None and where.viewmap.table is None:
+        where = where.with_views(columns * rows if views is None else views)
     if where.viewmap is None:
         raise InputError(f"{where.name}: a {where.layout} picture is not woven from a quilt")
-    if where.viewmap.table is None:
-        where = where.with_views(columns * rows if views is None else views)
-    common.check_output(output, IMAGE_SUFFIXES)
+    common.check_image(output)
     pixels = common.load_picture(quilt, alpha=True)
-    from ..render import weave as draw
+    from ..engines.cpu.gather import weave as draw
+    from ..image import write_image
 
+    panel = (where.width, where.height)
     with common.working("weaving"):
-        panel = draw(pixels, (columns, rows), where, filter=filter)
-        panel.save(output)
-    say(f"{output}  {panel.width}×{panel.height}")
+        flips = (where.flip_x, where.flip_y)
+        write_image(output, draw(pixels, (columns, rows), where.viewmap, panel, filter, flips))
+    say("{}  {}×{}".format(output, *panel))
