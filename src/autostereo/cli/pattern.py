@@ -28,7 +28,7 @@ BAND = 64  # panel rows at a time, for the same reason
 READ = {
     "numbers": "Move to the right: the numbers should count up. Down? Use --swap. Two at once? See --kind phase.",
     "eyes": "From the middle, the left eye should see a red L and the right eye a blue R. The other way? Use --swap.",
-    "pitch": "From the middle with one eye: take the strip with the fewest colour changes; ×1 is the present value.",
+    "pitch": "From the middle with one eye: take the strip with the fewest colour changes; x1 is the present value.",
     "slope": "From the middle with one eye: take the strip whose colour borders stand upright.",
     "phase": "From the middle with one eye: take the strip whose white line stands in the middle of the panel.",
 }
@@ -186,7 +186,7 @@ def make_sweep(display: Display, kind: str, strips: int, step: float) -> list[St
         change = (k - strips // 2) * step
         vary = _vary_mask if display.calibration is None else _vary_calibration
         viewmap, numbers = vary(display, kind, change)
-        label = f"{change:+.3f}" if kind == "phase" else f"×{1 + change:.4f}"
+        label = f"{change:+.3f}" if kind == "phase" else f"x{1 + change:.4f}"
         sweep.append(Strip(label, viewmap, f"{label:>8}  {numbers}"))
     return sweep
 

@@ -124,6 +124,8 @@ def plan_row(row, width, panel, sample_x, plan):
 @inlined
 def tiles_of_group(g, ends, width, plan):
     """Tiles of group g that the segment may touch: (first, end)."""
+    if plan.begin[g] == plan.begin[g + 1]:
+        return 0, 0
     x1, p1, x2, p2 = ends
     low, high = plan.bounds[0, g], plan.bounds[1, g]
     left = min(x1 + low * p1, x1 + high * p1)

@@ -28,7 +28,7 @@ K0, K1, K2, K3, K4, K5, K12, K13 = K[0], K[1], K[2], K[3], K[4], K[5], K[12], K[
 class Surface(NamedTuple):
     """Everything a raster kernel reads of the scene at one camera.
 
-    vertices (N, 3) float64: x at the centre camera, y, 1/depth; attributes (N, 6 or 12) float32; uv (N, 2) float64;
+    vertices (N, 3) float64: x at the centre camera, y, focal/depth; attributes (N, 6 or 12) float32; uv (N, 2) float64;
     triangles (T, 4) int32: top, middle, bottom vertex, 2·face + side of the long edge; bin_start (B + 1,), bins:
     triangles of each band, in the order of faces; face_material (F,) int32; materials (M, 8) float32: ambient,
     diffuse, specular, shininess, two-sided, texture or −1; texels uint32; texture_levels (T, L, 3), level_count (T,).
@@ -67,7 +67,7 @@ class Lighting(NamedTuple):
 
 @inlined
 def cut_edge(vertices, top, bottom, y, camera):
-    """Where row y crosses an edge: x at the centre camera, 1/depth, shift per unit of offset, perspective parameter.
+    """Where row y crosses an edge: x at the centre camera, focal/depth, shift per unit of offset, perspective parameter.
 
     Always from the upper to the lower vertex, so that triangles sharing the edge get the same bits.
     """
@@ -75,7 +75,7 @@ def cut_edge(vertices, top, bottom, y, camera):
     t = (y - y_top) / (vertices[bottom, 1] - y_top)
     x = vertices[top, 0] + t * (vertices[bottom, 0] - vertices[top, 0])
     z = z_top + t * (vertices[bottom, 2] - z_top)
-    shift = camera.fx * (1.0 / camera.focal - z)
+    shift = camera.fx / camera.focal * (1.0 - z)
     return np.float32(x), np.float32(z), np.float32(shift), np.float32(t * vertices[bottom, 2] / z)
 
 
@@ -128,7 +128,7 @@ def uv_gradient(surface, corners, camera):
     """Derivatives of 1/depth and uv/depth over the picture as functions of the offset; see level_of_detail."""
     v, uv = surface.vertices, surface.uv
     a, b, c = corners[0], corners[1], corners[2]
-    scale = camera.fx
+    scale = camera.fx / camera.focal
     xb, xc = v[b, 0] - v[a, 0], v[c, 0] - v[a, 0]
     pb, pc = scale * (v[a, 2] - v[b, 2]), scale * (v[a, 2] - v[c, 2])
     yb, yc = v[b, 1] - v[a, 1], v[c, 1] - v[a, 1]
@@ -224,6 +224,7 @@ def row_geometry(y, camera):
         np.float32(1.0 / camera.focal),
         np.float32(slope),
         np.float32(camera.offset_y),
+        np.float32(camera.focal),
     )
 
 

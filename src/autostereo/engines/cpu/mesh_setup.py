@@ -29,7 +29,10 @@ class CameraNumbers(NamedTuple):
 
 @kernel
 def project_vertices(first, last, positions, eye_from_world, camera, vertices):
-    """Fill vertices[first:last] = (x at the centre camera, y, 1/depth) from world positions (N, 3)."""
+    """Fill vertices[first:last] = (x at the centre camera, y, focal/depth) from world positions (N, 3).
+
+    The third is −1 for a vertex before the near plane.
+    """
     e = eye_from_world
     for i in range(first, last):
         px, py, pz = positions[i, 0], positions[i, 1], positions[i, 2]
@@ -45,7 +48,7 @@ def project_vertices(first, last, positions, eye_from_world, camera, vertices):
             0.5 * camera.height - camera.fy * (y - camera.offset_y) * inverse
             - camera.fy * camera.offset_y / camera.focal
         )
-        vertices[i, 2] = inverse
+        vertices[i, 2] = camera.focal * inverse
 
 
 @kernel
@@ -151,7 +154,7 @@ def clip_near(faces, face_ids, positions, eye_from_world, camera, vertices, attr
                     0.5 * camera.height - camera.fy * (y - camera.offset_y) * inverse
                     - camera.fy * camera.offset_y / camera.focal
                 )
-                vertices[new, 2] = inverse
+                vertices[new, 2] = camera.focal * inverse
                 for c in range(attributes.shape[1]):
                     attributes[new, c] = attributes[i, c] + t * (attributes[j, c] - attributes[i, c])
                 for c in range(uv.shape[1]):
@@ -179,7 +182,7 @@ def cull_and_count(chunk, faces, face_ids, vertices, scene, camera, span, bands,
     first, last = chunk
     rows_per_band, first_sample, last_sample = bands
     kept = first
-    scale = camera.fx
+    scale = camera.fx / camera.focal
     for f in range(first, last):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         ya, yb, yc = vertices[a, 1], vertices[b, 1], vertices[c, 1]
@@ -189,9 +192,9 @@ def cull_and_count(chunk, faces, face_ids, vertices, scene, camera, span, bands,
         if not row0 < row1:
             continue
         xa, xb, xc = vertices[a, 0], vertices[b, 0], vertices[c, 0]
-        pa = scale * (1.0 / camera.focal - vertices[a, 2])
-        pb = scale * (1.0 / camera.focal - vertices[b, 2])
-        pc = scale * (1.0 / camera.focal - vertices[c, 2])
+        pa = scale * (1.0 - vertices[a, 2])
+        pb = scale * (1.0 - vertices[b, 2])
+        pc = scale * (1.0 - vertices[c, 2])
         left, right = np.inf, -np.inf
         facing = 0
         for end in range(2):

@@ -92,12 +92,12 @@ def normalize_normals(n, sign, lists):
 def locate(n, row, lists):
     """Eye-space positions relative to the centre camera: P = (X, Y, depth) of every sample.
 
-    `row` = ((x − W/2)/fx factor, W/2, 1/focal, Y/depth without lens offset, lens offset).
+    `row` = (1/fx, W/2, 1/focal, Y/depth without lens offset, lens offset, focal).
     """
-    inverse_fx, centre, inverse_focal, slope, lens = row
+    inverse_fx, centre, inverse_focal, slope, lens, focal = row
     for i in range(n):
         offset = lists[OFFSET + i]
-        depth = ONE / lists[Z + i]
+        depth = focal / lists[Z + i]
         lists[PX + i] = depth * ((lists[X + i] - centre) * inverse_fx - offset * inverse_focal) + offset
         lists[PY + i] = depth * slope + lens
         lists[PZ + i] = depth

@@ -64,7 +64,8 @@ def modulate_by_texture(n, texels, levels, lists):
     for i in range(n):
         s, t, lod = lists[TS + i], lists[TT + i], lists[LOD + i]
         s, t = s - np.floor(s), t - np.floor(t)
-        lod = min(max(lod, ZERO), np.float32(top))
+        lod = lod if lod > ZERO else ZERO  # NaN too, where a triangle is seen edge-on
+        lod = min(lod, np.float32(top))
         fine = min(np.int64(lod), top)
         part = lod - np.float32(fine)
         r, g, b = bilinear(texels, levels[fine, 0], levels[fine, 1], levels[fine, 2], s, t)

@@ -172,7 +172,7 @@ def store_views(rows, grid, band, out):
 
 
 @inlined
-def store_depth(rows, grid, band, nearest, out):
+def store_depth(rows, focal, grid, band, nearest, out):
     """Write eye depth (V, H, W), inf where empty; with `nearest`, keep what is nearer."""
     views, _, width = out.shape
     for r in range(rows[0], rows[1]):
@@ -180,7 +180,7 @@ def store_depth(rows, grid, band, nearest, out):
             start = view_start(r - rows[0], view, grid) - LANES
             for x in range(width):
                 k = start + np.uint64(x // grid.columns) * TILE + np.uint64(x % grid.columns)
-                depth = ONE / np.int32(band[k]).view(np.float32)
+                depth = focal / np.int32(band[k]).view(np.float32)
                 out[view, r, x] = min(depth, out[view, r, x]) if nearest else depth
 
 
@@ -234,7 +234,7 @@ def draw_views(bands, surface, camera, lighting, lane_offsets, background, grid,
             if side > 1:
                 add_samples(rows, views, width, grid, scratch.band, scratch.sums)
             if depth.size > 0:
-                store_depth(rows, grid, scratch.band, sample > 0, depth)
+                store_depth(rows, np.float32(camera.focal), grid, scratch.band, sample > 0, depth)
         if side > 1:
             store_means(rows, side * side, scratch.sums, out)
         else:

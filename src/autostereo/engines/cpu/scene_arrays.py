@@ -17,7 +17,7 @@ from ..reference.texture import box_weights
 class SceneArrays(NamedTuple):
     """Meshes one behind the other.
 
-    positions (N, 3) float64, normals and colors (N, 3) float32, uv (N or 0, 2) float64, vertex_material (N,) int32,
+    positions (N, 3) float64, normals and colors (N, 3) float32, uv (N, 2) float64, or (0, 0) without textures, vertex_material (N,) int32,
     faces (F, 3) int32, face_material (F,) int32, materials (M, 8) float32: ambient, diffuse, specular, shininess,
     two-sided, texture or −1; texels int32 (RGBA); texture_levels (T, L, 3) int64: first texel, width, height;
     level_count (T,) int64.
@@ -101,7 +101,7 @@ def scene_arrays(scene: Scene) -> SceneArrays:
         parts["f"].append((mesh.faces[:, [0, 2, 1]] if mirrored else mesh.faces) + np.int32(first))
         parts["fm"].append(np.full(len(mesh.faces), m, np.int32))
         first += count
-    join = {name: np.concatenate(arrays) if arrays else np.zeros((0, 2)) for name, arrays in parts.items()}
+    join = {name: np.concatenate(arrays) if arrays else np.zeros((0, 0)) for name, arrays in parts.items()}
     packed = _pack_textures([image for _, image in images.values()])
     return SceneArrays(
         np.ascontiguousarray(join["p"]), np.ascontiguousarray(join["n"]), np.ascontiguousarray(join["c"]), join["t"],
