@@ -69,8 +69,8 @@ def choose_rig(scene: Scene, display: Display) -> Rig:
     from ..display.framing import depth_budget
     from ..display.rig import Rig
 
-    fov_y = 23.0 if display.aspect > 1 else 38.0
-    place = {"position": (0.0, 2.6, 9.0), "target": (-0.05, -0.2, -0.3)}
+    fov_y = 25.0 if display.aspect > 1 else 38.0
+    place = {"position": (0.0, 4.0, 8.5), "target": (-0.05, 0.2, -0.3)}
     rig = Rig(**place, fov_y=fov_y, baseline=1.0, views=display.views, aspect=display.aspect)  # type: ignore[arg-type]
     budget = depth_budget(replace(scene, objects=scene.objects[1:]), display, rig)
     comfortable = display.comfort / max(abs(budget.disparity_near), abs(budget.disparity_far))
