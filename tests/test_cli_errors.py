@@ -291,6 +291,42 @@ def test_a_closed_pipe_is_no_error(folder: Path) -> None:
     assert done.stdout.startswith("acer") and done.stderr == ""
 
 
+def test_the_first_run_says_that_it_compiles(cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from autostereo.engines.cpu import jit
+
+    arguments = ("render", "square.off", "-d", "lenticular-8", *SMALL)
+    monkeypatch.setattr(jit, "is_compiled", lambda: False)
+    assert cli(*arguments).err.startswith("compiling kernels (once, up to a minute)…\n")
+    assert cli(*arguments, "-q").err == ""
+    assert "compiling" not in cli(*arguments, "--engine", "reference").err
+    monkeypatch.setattr(jit, "is_compiled", lambda: True)
+    assert "compiling" not in cli(*arguments).err
+
+
+def test_progress_on_a_terminal(folder: Path) -> None:
+    """The spinner goes to stderr only, and is gone in the end."""
+    pty = pytest.importorskip("pty")
+    terminal, stderr = pty.openpty()
+    code = "from autostereo.cli import main; main()"
+    command = [sys.executable, "-c", code, "views", "square.off", "-o", "out", "--size", "48x64"]
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "80"}
+    process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=stderr, env=environment)
+    os.close(stderr)
+    shown = b""
+    while True:  # a terminal that nobody reads would block the process
+        try:
+            part = os.read(terminal, 4096)
+        except OSError:  # how Linux reports the end of a terminal
+            break
+        if not part:
+            break
+        shown += part
+    os.close(terminal)
+    out, _ = process.communicate(timeout=30)
+    assert out.decode() == "out  8 views of 48×64\n"
+    assert b"rendering 8 views" in shown and b"\x1b[2K" in shown  # drawn, and erased
+
+
 def test_no_progress_in_a_pipe(folder: Path) -> None:
     code = "from autostereo.cli import main; main()"
     command = [sys.executable, "-c", code, "render", "square.off", "-d", "lenticular-8", "--size", "48x64"]
