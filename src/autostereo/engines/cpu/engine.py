@@ -15,21 +15,21 @@ from ...scene.scene import Scene
 from ..engine import Camera, Draw, Target
 from . import gather
 from .jit import is_compiled
-from .mesh_panel import CELL, Panel, RowPlan, draw_panel
-from .mesh_raster import Lighting, Scratch, Surface
+from .mesh_panel import PanelNumbers, draw_panel
+from .mesh_raster import Scratch, Shader, Surface
 from .mesh_setup import (
     CameraNumbers, clip_near, count_crossing, cull_and_count, fill_bins, light_vertices, project_vertices, turn_normals,
 )
 from .mesh_shade import FLOAT_ROWS, INT_ROWS, STRIDE
 from .mesh_views import draw_views
+from .panel_plan import Plans, make_plans
 from .scene_arrays import SceneArrays, background_word, light_array, scene_arrays
 from .threads import run_rows
-from .tiles import Grid
 
 __all__ = ["CpuEngine", "is_compiled"]
 
-BAND_BYTES = 400_000  # of tiles: with what else a band touches it stays in L2
-TILE_BYTES = 128
+BAND_BYTES = 160_000  # of samples: with what else a band touches it stays in L2
+PANEL_ROWS = 4  # rows of a panel per bin
 VERTEX_CHUNK = 8192
 
 
@@ -40,7 +40,26 @@ class Prepared:
     scene: Scene
     arrays: SceneArrays
     buffers: dict[str, NDArray[Any]] = field(default_factory=dict)
+    pools: dict[tuple[Any, ...], Pool] = field(default_factory=dict)
+    plan: tuple[Any, ...] | None = None
     lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def plans(self, draw: Draw, groups: int) -> Plans:
+        """The plans of the panel's rows, those of the frame before if they still fit."""
+        assert draw.viewmap is not None
+        key = (draw.viewmap, draw.camera.width, draw.camera.height, draw.flip_x, draw.flip_y, groups, draw.offsets.tobytes())
+        if self.plan is None or self.plan[0] != key:
+            size = (draw.camera.width, draw.camera.height)
+            self.plan = key, make_plans(draw.viewmap, size, (draw.flip_x, draw.flip_y), draw.offsets, groups)
+        return self.plan[1]
+
+    def pool(self, key: tuple[Any, ...], make: Any) -> Pool:
+        """Memory for tasks of this kind and size; what another size needed is let go."""
+        if key not in self.pools:
+            for old in [k for k in self.pools if k[0] == key[0]]:
+                del self.pools[old]
+            self.pools[key] = Pool(make)
+        return self.pools[key]
 
     def buffer(self, name: str, shape: tuple[int, ...], dtype: type) -> NDArray[Any]:
         """An uninitialised array of this shape, in memory kept under `name`."""
@@ -88,53 +107,46 @@ class CpuEngine:
 
     def _draw_views(self, prepared: Prepared, draw: Draw, target: Target) -> None:
         views, height, width, _ = target.color.shape
-        grid = tile_grid(views, width)
-        row_bytes = grid.groups * grid.across * TILE_BYTES
-        rows_per_band = int(np.clip(BAND_BYTES // row_bytes, 1, 16))
-        surface, camera, lighting = surface_at(prepared, draw, rows_per_band)
-        lanes = np.full(grid.groups * grid.views, draw.offsets[-1])
-        lanes[:views] = draw.offsets
-        lane_offsets = np.repeat(lanes, grid.columns).astype(np.float32)
         side = round(draw.options.samples**0.5)
-        sums = rows_per_band * views * width * 4 if side > 1 else 0
-        scratches = Pool(lambda: new_scratch(rows_per_band * grid.groups * grid.across, sums))
+        block, rows_per_band = view_blocks(views, width)
+        blocks = -(-width // block)
+        surface, camera, shader = surface_at(prepared, draw, (rows_per_band, block, blocks))
+        samples = rows_per_band * views * block
+        sums = 4 * samples if side > 1 else 0
+        pool = prepared.pool(("views", samples, sums), lambda: new_scratch(samples, sums))
+        offsets = draw.offsets.astype(np.float32)
         background = background_word(prepared.scene)
         out = target.color.view(np.int32).reshape(views, height, width)
         depth = np.empty((0, 0, 0), np.float32) if target.depth is None else target.depth
 
         def task(first: int, end: int) -> None:
-            with scratches as scratch:
-                draw_views(
-                    (first, end, rows_per_band), surface, camera, lighting, lane_offsets, background, grid, side,
-                    scratch, out, depth,
-                )
+            with pool as scratch:
+                bins = (first, end, rows_per_band, blocks, block)
+                draw_views(bins, surface, camera, shader, offsets, background, side, scratch, out, depth)
 
-        run_rows(-(-height // rows_per_band), task)
+        run_rows(-(-height // rows_per_band) * blocks, task)
 
     def _draw_panel(self, prepared: Prepared, draw: Draw, target: Target) -> None:
         assert draw.viewmap is not None
         height, width, _ = target.color.shape
-        rows_per_band = 4
-        surface, camera, lighting = surface_at(prepared, draw, rows_per_band)
+        surface, camera, shader = surface_at(prepared, draw, (PANEL_ROWS, width, 1))
         side = round(draw.options.samples**0.5)
-        panel = Panel(
-            gather.map_args(draw.viewmap), np.ascontiguousarray(draw.offsets, dtype=np.float64),
-            offset_groups(prepared, draw), draw.flip_x, draw.flip_y, draw.options.sampling == "subpixel",
-        )
-        tiles = -(-3 * width // 16) + panel.groups
-        plans = Pool(
-            lambda: (new_plan(width, tiles, panel.groups), new_scratch(tiles, 3 * width if side > 1 else 0))
-        )
+        flips = (draw.flip_x, draw.flip_y)
+        panel = PanelNumbers(gather.map_args(draw.viewmap), *flips, draw.options.sampling == "subpixel")
+        plans = prepared.plans(draw, offset_groups(surface, camera, draw.offsets))
+        total = plans.x.shape[1]
+        sums = 3 * width if side > 1 else 0
+        pool = prepared.pool(("panel", total, sums), lambda: (new_row(total), new_scratch(total, sums)))
         background = background_word(prepared.scene)
 
         def task(first: int, end: int) -> None:
-            with plans as (plan, scratch):
+            with pool as (row_memory, scratch):
+                bands = (first, end, PANEL_ROWS)
                 draw_panel(
-                    (first, end, rows_per_band), surface, camera, lighting, panel, background, np.uint64(16), side,
-                    plan, scratch, target.color,
+                    bands, surface, camera, shader, panel, plans, background, side, row_memory, scratch, target.color
                 )
 
-        run_rows(-(-height // rows_per_band), task)
+        run_rows(-(-height // PANEL_ROWS), task)
 
 
 class Pool:
@@ -155,45 +167,44 @@ class Pool:
         self._free.put(self._local.item)
 
 
-def new_scratch(tiles: int, sums: int) -> Scratch:
-    """One thread's memory for a band of `tiles`, with `sums` accumulators for sub-samples."""
+def new_scratch(samples: int, sums: int) -> Scratch:
+    """One thread's memory for a band of `samples`, with `sums` accumulators for sub-samples."""
+    words = np.zeros(STRIDE, np.int64)
     return Scratch(
-        np.zeros(tiles * TILE_BYTES // 4, np.int32), np.zeros(32, np.float32), np.zeros(FLOAT_ROWS * STRIDE, np.float32),
-        np.zeros(INT_ROWS * STRIDE, np.int32), np.zeros(sums, np.uint16),
+        np.zeros(samples, np.int64), np.zeros(32, np.float32), np.zeros(FLOAT_ROWS * STRIDE, np.float32),
+        np.zeros(INT_ROWS * STRIDE, np.int32), words, words.view(np.int32), np.zeros(sums, np.uint16),
     )
 
 
-def new_plan(width: int, tiles: int, groups: int) -> RowPlan:
-    """One thread's memory for the plan of a panel row."""
-    return RowPlan(
-        np.empty((width, 3)), np.empty(2 * tiles * 16, np.float32), np.empty(tiles * 16, np.float32),
-        np.empty(3 * width, np.int32), np.empty(3 * width, np.int32), np.empty(groups + 1, np.int64),
-        np.empty((-(-width // CELL) + 2, groups), np.int32), np.empty((2, groups), np.float32),
-    )
+def new_row(total: int) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]:
+    """One thread's memory for a panel row of `total` samples: offsets, places, finished values."""
+    return np.zeros(total, np.float32), np.zeros(total, np.float32), np.zeros(total + 3, np.uint8)
 
 
-def tile_grid(views: int, width: int) -> Grid:
-    """Shape of the tiles for V views: as square as the number of views lets them be."""
-    per_tile = 1 if views == 1 else 2 if views == 2 else 4
-    columns = 16 // per_tile
-    return Grid(per_tile, columns, -(-views // per_tile), -(-width // columns), 16)
+def view_blocks(views: int, width: int) -> tuple[int, int]:
+    """Columns of a block and rows of a band for which the samples of all views stay in cache."""
+    columns = max(64, BAND_BYTES // (8 * views))
+    blocks = -(-width // columns)
+    block = (-(-width // blocks) + 7) // 8 * 8
+    return block, int(np.clip(BAND_BYTES // (8 * views * block), 1, 16))
 
 
-def offset_groups(prepared: Prepared, draw: Draw) -> int:
-    """How many groups of offsets a panel's row is sorted into.
+def offset_groups(surface: Surface, camera: CameraNumbers, offsets: NDArray[np.float64]) -> int:
+    """Into how many groups of offsets a panel's rows are best sorted.
 
-    A tile of G groups spans 16·G/3 pixels, and a segment slides by parallax/G within a group: best when alike.
+    A segment visits in each of G groups 3/G of the sub-pixels along its width and along the parallax/G pixels by which it
+    slides within the group: few groups mean long stretches, many groups many short ones.
     """
-    vertices = prepared.buffers["vertices"].reshape(-1, 3)[:: max(1, len(prepared.arrays.positions) // 1000), 2]
-    vertices = vertices[vertices > 0]
-    reach = draw.offsets[-1] - draw.offsets[0]
-    parallax = draw.camera.fx * reach * np.abs(1.0 / draw.camera.focal - vertices)
-    typical = float(np.mean(parallax)) if len(vertices) else 0.0
-    return int(np.clip(round((3 * typical / 16) ** 0.5), 1, 16))
+    shown = surface.bins[: surface.bin_start[-1]]
+    if len(shown) == 0:
+        return 1
+    tops = surface.triangles[shown[:: max(1, len(shown) // 1000)], 0]
+    parallax = camera.fx / camera.focal * np.abs(1.0 - surface.vertices[tops, 2]) * np.ptp(offsets)
+    return int(np.clip(2 ** round(np.log2(max(float(np.median(parallax)), 1.0) / 4) / 2), 1, 16))
 
 
-def surface_at(prepared: Prepared, draw: Draw, rows_per_band: int) -> tuple[Surface, CameraNumbers, Lighting]:
-    """Project, light, clip, cull and bin the scene's triangles for one camera."""
+def surface_at(prepared: Prepared, draw: Draw, bins: tuple[int, int, int]) -> tuple[Surface, CameraNumbers, Shader]:
+    """Project, light, clip, cull and bin the scene's triangles; bins = (rows per band, columns per block, blocks)."""
     arrays, camera, options = prepared.arrays, draw.camera, draw.options
     numbers = CameraNumbers(
         float(camera.width), float(camera.height), camera.fx, camera.fy, camera.focal, camera.near, camera.offset_y
@@ -223,14 +234,18 @@ def surface_at(prepared: Prepared, draw: Draw, rows_per_band: int) -> tuple[Surf
             arrays, e, numbers, crossing, (faces, face_ids, vertices, attributes, uv)
         )
     side = round(options.samples**0.5)
-    bands = (rows_per_band, 0.5 / side, 1.0 - 0.5 / side)
-    triangles, bin_start, bins = _binned(prepared, (faces, face_ids, vertices), numbers, draw.culling, bands)
+    bands = (bins[0], 0.5 / side, 1.0 - 0.5 / side, float(bins[1]), bins[2])
+    triangles, bin_start, binned = _binned(prepared, (faces, face_ids, vertices), numbers, draw.culling, bands)
+    columns = 6 if per_sample or arrays.materials[:, 2].any() else 3
     surface = Surface(
-        vertices, attributes, uv, triangles, bin_start, bins, arrays.face_material, arrays.materials, arrays.texels,
-        arrays.texture_levels, arrays.level_count,
+        vertices, attributes, uv, triangles, bin_start, binned, arrays.face_material, arrays.materials, columns
     )
     own_eye = np.float32(options.shading != "center")
-    return surface, numbers, Lighting(lights, per_sample, own_eye)
+    points = bool(lights[:, 0].any())
+    shader = Shader(
+        lights, arrays.texels, arrays.texture_levels, arrays.level_count, per_sample, own_eye, points
+    )
+    return surface, numbers, shader
 
 
 def _clipped(arrays: SceneArrays, e: Any, camera: CameraNumbers, crossing: int, held: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -255,10 +270,10 @@ def _binned(
     faces, face_ids, vertices = mesh
     chunks = max(1, min(2 * numba.get_num_threads(), len(faces) // 4096))
     edges = np.linspace(0, len(faces), chunks + 1).astype(np.int64)
-    count_bands = -(-int(camera.height) // bands[0])
+    count_bands = -(-int(camera.height) // bands[0]) * bands[4]
     counts = np.zeros((chunks, count_bands), np.int64)
     kept = np.zeros(chunks, np.int64)
-    triangles = prepared.buffer("triangles", (max(len(faces), 1), 4), np.int32)
+    triangles = prepared.buffer("triangles", (max(len(faces), 1), 6), np.int32)
 
     def cull(first: int, last: int) -> None:
         for c in range(first, last):

@@ -29,9 +29,9 @@ class Surface(NamedTuple):
     """Everything a raster kernel reads of the scene at one camera.
 
     vertices (N, 3) float64: x at the centre camera, y, focal/depth; attributes (N, 6 or 12) float32; uv (N, 2) float64;
-    triangles (T, 4) int32: top, middle, bottom vertex, 2·face + side of the long edge; bin_start (B + 1,), bins:
-    triangles of each band, in the order of faces; face_material (F,) int32; materials (M, 8) float32: ambient,
-    diffuse, specular, shininess, two-sided, texture or −1; texels uint32; texture_levels (T, L, 3), level_count (T,).
+    triangles (T, 6) int32: see mesh_setup.cull_and_count; bin_start (B + 1,), bins: triangles of each bin, in the order
+    of faces; face_material (F,) int32; columns: attributes that a segment needs; materials (M, 8) float32: ambient,
+    diffuse, specular, shininess, two-sided, texture or −1, plain (needs no list of samples), 0.
     """
 
     vertices: np.ndarray
@@ -42,27 +42,35 @@ class Surface(NamedTuple):
     bins: np.ndarray
     face_material: np.ndarray
     materials: np.ndarray
-    texels: np.ndarray
-    texture_levels: np.ndarray
-    level_count: np.ndarray
+    columns: int
 
 
 class Scratch(NamedTuple):
-    """One thread's own memory: band of tiles, segment ends, lists (mesh_shade), sums of sub-samples."""
+    """One thread's own memory: band of samples, segment ends, lists (mesh_shade), words of lanes, sums of sub-samples."""
 
     band: np.ndarray
     segment: np.ndarray
     lists: np.ndarray
     ints: np.ndarray
+    words: np.ndarray
+    halves: np.ndarray
     sums: np.ndarray
 
 
-class Lighting(NamedTuple):
-    """How to shade: lights (L, 8) float32 in eye space (kind, x, y, z, r, g, b, 0), per sample or not, own eye 1 or 0."""
+class Shader(NamedTuple):
+    """What `shade` reads besides the segment. (Arrays are taken out of tuples once per band: each time counts a
+    reference, atomically.)
+
+    lights (L, 8) float32; textures = (texels, texture_levels, level_count); per_sample; own_eye; point_lights: any.
+    """
 
     lights: np.ndarray
+    texels: np.ndarray
+    texture_levels: np.ndarray
+    level_count: np.ndarray
     per_sample: bool
     own_eye: np.float32
+    point_lights: bool
 
 
 @inlined
@@ -80,12 +88,12 @@ def cut_edge(vertices, top, bottom, y, camera):
 
 
 @inlined
-def cut_triangle(vertices, corners, y, camera):
+def cut_triangle(vertices, corners, odd, y, camera):
     """The two edges of a triangle that row y crosses, front side's left edge first.
 
-    corners = (top, middle, bottom, side of the long edge); each edge is its cut_edge values, top and bottom vertex.
+    corners = (top, middle, bottom); odd: the long edge is the left one. Each edge is its cut_edge values and vertices.
     """
-    a, b, c, odd = corners
+    a, b, c = corners
     top, bottom = (a, b) if y < vertices[b, 1] else (b, c)
     x, z, p, u = cut_edge(vertices, a, c, y, camera)
     long_edge = (x, z, p, u, a, c)
@@ -97,9 +105,8 @@ def cut_triangle(vertices, corners, y, camera):
 
 
 @inlined
-def fill_segment(surface, lighting, left, right, first, columns, segment):
+def fill_segment(attributes, left, right, first, columns, segment):
     """Attributes first … first + columns at the segment's left end, and their difference to the right end."""
-    attributes = surface.attributes
     u, a, b = left[3], left[4], left[5]
     w, c, d = right[3], right[4], right[5]
     for k in range(columns):
@@ -110,9 +117,8 @@ def fill_segment(surface, lighting, left, right, first, columns, segment):
 
 
 @inlined
-def fill_uv(surface, corners, left, right, segment):
+def fill_uv(uv, corners, left, right, segment):
     """Texture coordinates at both ends, less the triangle's own whole part (levels repeat up to ±4096 times)."""
-    uv = surface.uv
     u, a, b = left[3], left[4], left[5]
     w, c, d = right[3], right[4], right[5]
     for k in range(2):
@@ -124,9 +130,8 @@ def fill_uv(surface, corners, left, right, segment):
 
 
 @inlined
-def uv_gradient(surface, corners, camera):
+def uv_gradient(v, uv, corners, camera):
     """Derivatives of 1/depth and uv/depth over the picture as functions of the offset; see level_of_detail."""
-    v, uv = surface.vertices, surface.uv
     a, b, c = corners[0], corners[1], corners[2]
     scale = camera.fx / camera.focal
     xb, xc = v[b, 0] - v[a, 0], v[c, 0] - v[a, 0]
@@ -147,71 +152,40 @@ def uv_gradient(surface, corners, camera):
 
 
 @kernel
-def shade(n, surface, lighting, shape, scratch):
+def shade(n, shader, material, side, row, gradient, segment, lists, ints):
     """Colours of a list of samples of one segment, as RGBA bytes.
 
-    shape = (material, side, row of `locate`, uv gradient).
+    material = (ambient, diffuse, specular, shininess, texture); row = what `locate` needs; gradient = uv_gradient.
     """
-    m, side, row, gradient = shape
-    segment, lists, ints = scratch.segment, scratch.lists, scratch.ints
+    ambient, diffuse, specular, shininess, texture = material
     listed = n
     n = (n + np.uint64(15)) & ~np.uint64(15)  # whole SIMD steps; what lies beyond the list does no harm
-    material = surface.materials[m]
-    texture = np.int64(material[5])
-    per_sample = lighting.per_sample
     interpolate(n, segment, K0, KR, lists)
     interpolate(n, segment, K1, KG, lists)
     interpolate(n, segment, K2, KB, lists)
-    if texture >= 0:
+    if texture >= ZERO:
         interpolate(n, segment, K12, TS, lists)
         interpolate(n, segment, K13, TT, lists)
-        levels = surface.texture_levels[texture, : surface.level_count[texture]]
-        level_of_detail(n, gradient, (np.float32(levels[0, 1]), np.float32(levels[0, 2])), lists)
-        modulate_by_texture(listed, surface.texels, levels, lists)
-    if per_sample:
+        t = np.int64(texture)
+        levels = shader.texture_levels
+        level_of_detail(n, gradient, (np.float32(levels[t, 0, 1]), np.float32(levels[t, 0, 2])), lists)
+        modulate_by_texture(listed, shader.texels, t, levels, shader.level_count[t] - 1, lists)
+    if shader.per_sample:
         interpolate(n, segment, K3, NX, lists)
         interpolate(n, segment, K4, NY, lists)
         interpolate(n, segment, K5, NZ, lists)
         normalize_normals(n, ONE - np.float32(2 * side), lists)
         clear_sums(n, lists)
-        if needs_position(material, lighting):
+        if specular > ZERO or shader.point_lights:
             locate(n, row, lists)
-        for k in range(lighting.lights.shape[0]):
-            add_light(n, lighting.lights[k], material, (lighting.own_eye, row[4]), lists)
-        modulate(n, material[0], material[1], material[2], lists)
+        for k in range(shader.lights.shape[0]):
+            add_light(n, k, shader.lights, (specular, shininess), (shader.own_eye, row[4]), lists)
+        modulate(n, ambient, diffuse, specular, lists)
     else:
         interpolate(n, segment, K3, SR, lists)
         interpolate(n, segment, K4, SG, lists)
         interpolate(n, segment, K5, SB, lists)
     pack(n, lists, ints)
-
-
-@kernel
-def needs_position(material, lighting):
-    """Whether shading per sample asks where the sample is: for highlights and point lights."""
-    if material[2] > ZERO:
-        return True
-    for k in range(lighting.lights.shape[0]):
-        if lighting.lights[k, 0] != ZERO:
-            return True
-    return False
-
-
-@inlined
-def segment_columns(surface, lighting):
-    """How many attributes a segment needs: colour and normal, or light and, if any material shines, highlight."""
-    columns = 6 if lighting.per_sample else 3
-    for m in range(surface.materials.shape[0]):
-        if surface.materials[m, 2] > ZERO:
-            columns = 6
-    return columns
-
-
-@inlined
-def is_plain(surface, lighting, m):
-    """Whether material m needs no list of samples: lit at vertices, no texture, no highlight."""
-    materials = surface.materials
-    return not (lighting.per_sample or materials[m, 5] >= ZERO or materials[m, 2] > ZERO)
 
 
 @inlined

@@ -171,16 +171,17 @@ def clip_near(faces, face_ids, positions, eye_from_world, camera, vertices, attr
 
 @kernel
 def cull_and_count(chunk, faces, face_ids, vertices, scene, camera, span, bands, out, counts):
-    """Keep the triangles of one chunk that some view may see, and count them per band.
+    """Keep the triangles of one chunk that some view may see, and count them per bin.
 
-    out[k] = (top, middle, bottom vertex, 2·face + side of the long edge); the triangles of chunk
-    (first, last) are written from out[first] on, in the order of faces. counts[band] is increased.
+    A bin is a band of rows × a block of columns; bands = (rows per band, first and last sample of a row, columns per
+    block, blocks). out[k] = (top, middle, bottom vertex, 2·face + side of the long edge, first block, last block); the
+    triangles of chunk (first, last) are written from out[first] on, in the order of faces. counts[bin] is increased.
 
     Culling is conservative over all camera offsets in `span`: x is affine and the signed area too, so both
     ends of the span decide. Returns the number kept.
     """
     first, last = chunk
-    rows_per_band, first_sample, last_sample = bands
+    rows_per_band, first_sample, last_sample, columns, blocks = bands
     kept = first
     scale = camera.fx / camera.focal
     for f in range(first, last):
@@ -218,21 +219,25 @@ def cull_and_count(chunk, faces, face_ids, vertices, scene, camera, span, bands,
             b, c, yb, yc, odd = c, b, yc, yb, 1 - odd
         if yb < ya:
             a, b, ya, yb, odd = b, a, yb, ya, 1 - odd
+        block0 = int(min(max((left - margin) / columns, 0.0), blocks - 1.0))
+        block1 = int(min(max((right + margin) / columns, 0.0), blocks - 1.0))
         out[kept, 0], out[kept, 1], out[kept, 2], out[kept, 3] = a, b, c, 2 * face + odd
+        out[kept, 4], out[kept, 5] = block0, block1
         kept += 1
-        band0, band1 = int(row0) // rows_per_band, (int(row1) - 1) // rows_per_band
-        for band in range(band0, band1 + 1):
-            counts[band] += 1
+        for band in range(int(row0) // rows_per_band, (int(row1) - 1) // rows_per_band + 1):
+            for block in range(block0, block1 + 1):
+                counts[band * blocks + block] += 1
     return kept - first
 
 
 @kernel
 def fill_bins(first, count, triangles, vertices, height, bands, cursor, bins):
-    """Write the indices of triangles first…first+count into the bins of their bands, from cursor[band] on."""
-    rows_per_band, first_sample, last_sample = bands
+    """Write the indices of triangles first…first+count into their bins, from cursor[bin] on."""
+    rows_per_band, first_sample, last_sample, _, blocks = bands
     for k in range(first, first + count):
         row0 = max(np.ceil(vertices[triangles[k, 0], 1] - last_sample), 0.0)
         row1 = min(np.ceil(vertices[triangles[k, 2], 1] - first_sample), height)
         for band in range(int(row0) // rows_per_band, (int(row1) - 1) // rows_per_band + 1):
-            bins[cursor[band]] = k
-            cursor[band] += 1
+            for block in range(triangles[k, 4], triangles[k, 5] + 1):
+                bins[cursor[band * blocks + block]] = k
+                cursor[band * blocks + block] += 1

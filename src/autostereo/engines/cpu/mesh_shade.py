@@ -16,17 +16,17 @@ from .jit import inlined, kernel
 STRIDE = 1040  # list capacity: 1024 + one cache line, so that lists do not fall onto the same cache set
 CAPACITY = 1024
 
-# rows of the float32 scratch: the tile at hand …
-LEFT, RIGHT, COLUMN, TILE_U, TILE_Z = (np.uint64(k * STRIDE) for k in range(5))
+# rows of the float32 scratch: lanes of samples at hand …
+START, RUN, LANE_U, LANE_Z = (np.uint64(k * STRIDE) for k in range(4))
 # … and the list of visible samples
-U, Z, OFFSET, X = (np.uint64((5 + k) * STRIDE) for k in range(4))
-KR, KG, KB, NX, NY, NZ = (np.uint64((9 + k) * STRIDE) for k in range(6))
-DR, DG, DB, SR, SG, SB = (np.uint64((15 + k) * STRIDE) for k in range(6))
-PX, PY, PZ, LOD, TS, TT = (np.uint64((21 + k) * STRIDE) for k in range(6))
-FLOAT_ROWS = 27
+U, Z, OFFSET, X = (np.uint64((4 + k) * STRIDE) for k in range(4))
+KR, KG, KB, NX, NY, NZ = (np.uint64((8 + k) * STRIDE) for k in range(6))
+DR, DG, DB, SR, SG, SB = (np.uint64((14 + k) * STRIDE) for k in range(6))
+PX, PY, PZ, LOD, TS, TT = (np.uint64((20 + k) * STRIDE) for k in range(6))
+FLOAT_ROWS = 26
 # rows of the int32 scratch
-ADDRESS, COLOR = (np.uint64(k * STRIDE) for k in range(2))
-INT_ROWS = 2
+ADDRESS, COLOR, BASE, VISIT_TILE, VISIT_LANE, VISIT_X = (np.uint64(k * STRIDE) for k in range(6))
+INT_ROWS = 6
 
 SEGMENT_ATTRIBUTES = 16  # segment[0:16] at the left end, segment[16:32] the difference to the right end
 
@@ -104,12 +104,17 @@ def locate(n, row, lists):
 
 
 @kernel
-def add_light(n, light, material, view, lists):
-    """Add one light to the diffuse and specular sums; view = (1 for each sample's own eye or 0, lens offset)."""
-    point = light[0] == LIGHT_POINT
-    lx, ly, lz, r, g, b = light[1], light[2], light[3], light[4], light[5], light[6]
+def add_light(n, k, lights, highlight, view, lists):
+    """Add light k to the diffuse and specular sums.
+
+    highlight = (specular, shininess); view = (1 for each sample's own eye or 0 for the centre's, lens offset).
+    """
+    point = lights[k, 0] == LIGHT_POINT
+    lx, ly, lz = lights[k, 1], lights[k, 2], lights[k, 3]
+    r, g, b = lights[k, 4], lights[k, 5], lights[k, 6]
     own, lens = view
-    if not point and material[2] == ZERO:
+    specular, shininess = highlight
+    if not point and specular == ZERO:
         for i in range(n):
             nl = max(lists[NX + i] * lx + lists[NY + i] * ly + lists[NZ + i] * lz, ZERO)
             lists[DR + i] += r * nl
@@ -117,7 +122,6 @@ def add_light(n, light, material, view, lists):
             lists[DB + i] += b * nl
         return
     p = ONE if point else ZERO
-    shininess = material[3]
     for i in range(n):
         px, py, pz = lists[PX + i], lists[PY + i], lists[PZ + i]
         nx, ny, nz = lists[NX + i], lists[NY + i], lists[NZ + i]
@@ -130,14 +134,14 @@ def add_light(n, light, material, view, lists):
         hx, hy, hz = tx + vx * scale, ty + vy * scale, tz - pz * scale
         scale = ONE / np.sqrt(max(hx * hx + hy * hy + hz * hz, TINY))
         nh = max((nx * hx + ny * hy + nz * hz) * scale, TINY)
-        highlight = exp2_fast(shininess * log2_fast(min(nh, ONE)))
-        highlight = highlight if nl > ZERO else ZERO
+        shine = exp2_fast(shininess * log2_fast(min(nh, ONE)))
+        shine = shine if nl > ZERO else ZERO
         lists[DR + i] += r * nl
         lists[DG + i] += g * nl
         lists[DB + i] += b * nl
-        lists[SR + i] += r * highlight
-        lists[SG + i] += g * highlight
-        lists[SB + i] += b * highlight
+        lists[SR + i] += r * shine
+        lists[SG + i] += g * shine
+        lists[SB + i] += b * shine
 
 
 @kernel

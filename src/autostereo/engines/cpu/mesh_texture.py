@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .jit import kernel
+from .jit import inlined, kernel
 from .mesh_shade import HALF, KB, KG, KR, LOD, OFFSET, ONE, TINY, TS, TT, Z, ZERO, log2_fast
 
 BYTE_SCALE = np.float32(1.0 / 255.0)
@@ -29,7 +29,7 @@ def level_of_detail(n, gradient, size, lists):
         lists[LOD + i] = HALF * log2_fast(min(max(square, TINY), np.float32(1e20)))
 
 
-@kernel
+@inlined
 def bilinear(texels, first, width, height, s, t):
     """Colour at (s, t) ∈ one period, (0, 0) the bottom left; texel centres at (i + ½)/size, wrapping round."""
     x = s * np.float32(width) - HALF
@@ -58,9 +58,8 @@ def bilinear(texels, first, width, height, s, t):
 
 
 @kernel
-def modulate_by_texture(n, texels, levels, lists):
-    """Multiply the colour lists by the trilinear texture colour; levels (L, 3): first texel, width, height."""
-    top = levels.shape[0] - 1
+def modulate_by_texture(n, texels, texture, levels, top, lists):
+    """Multiply the colour lists by the trilinear texture colour; levels (T, L, 3): first texel, width, height."""
     for i in range(n):
         s, t, lod = lists[TS + i], lists[TT + i], lists[LOD + i]
         s, t = s - np.floor(s), t - np.floor(t)
@@ -68,10 +67,10 @@ def modulate_by_texture(n, texels, levels, lists):
         lod = min(lod, np.float32(top))
         fine = min(np.int64(lod), top)
         part = lod - np.float32(fine)
-        r, g, b = bilinear(texels, levels[fine, 0], levels[fine, 1], levels[fine, 2], s, t)
+        r, g, b = bilinear(texels, levels[texture, fine, 0], levels[texture, fine, 1], levels[texture, fine, 2], s, t)
         if part > ZERO:
             k = fine + 1
-            r1, g1, b1 = bilinear(texels, levels[k, 0], levels[k, 1], levels[k, 2], s, t)
+            r1, g1, b1 = bilinear(texels, levels[texture, k, 0], levels[texture, k, 1], levels[texture, k, 2], s, t)
             r, g, b = r + part * (r1 - r), g + part * (g1 - g), b + part * (b1 - b)
         lists[KR + i] *= r
         lists[KG + i] *= g

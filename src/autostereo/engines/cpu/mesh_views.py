@@ -1,8 +1,9 @@
-"""Meshes to a stack of views: a band of rows of every view at a time, in cache.
+"""Meshes to a stack of views: a block of rows and columns of every view at a time, in cache.
 
-For each triangle and row, its segment (mesh_raster) is drawn into all views before the next: group by group of
-views, tile by tile (tiles). Plain colours are done within the tile; dearer shading collects the visible samples
-of the segment in lists first, so that shading is SIMD over visible samples only.
+For each triangle and row, its segment (mesh_raster) is drawn into all views before the next: the pixels that it covers
+in each view (SIMD over views), then the first covered sample of every view, the second, and so on: depth, colour
+(SIMD over views), then one scalar pass that keeps what is nearer. Dearer shading collects the visible samples of the
+segment in lists first, so that it is SIMD over visible samples only.
 """
 
 from __future__ import annotations
@@ -10,203 +11,208 @@ from __future__ import annotations
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_raster import (
-    cut_triangle, fill_segment, fill_uv, is_plain, row_geometry, rows_of, segment_columns, shade, uv_gradient,
+from .mesh_raster import cut_triangle, fill_segment, fill_uv, row_geometry, rows_of, shade, uv_gradient
+from .mesh_shade import (
+    ADDRESS, BASE, CAPACITY, LANE_U, LANE_Z, OFFSET, RUN, START, U, X, Z, ZERO,
 )
-from .mesh_shade import ADDRESS, CAPACITY, COLUMN, LEFT, OFFSET, ONE, RIGHT, TILE_U, TILE_Z, U, X, Z, ZERO
-from .tiles import LANES, TILE, clear_tiles, draw_tile_plain, lowest_lane, scatter, test_tile
+from .samples import COLOR_MASK, DEPTH_SHIFT, clear_samples, hit, nearer, plain_color, scatter, word
 
 NO_GRADIENT = (ZERO,) * 11
+VIEWS_AT_ONCE = 512  # leaves the lists room for the samples of two steps
 
 
 @inlined
-def tiles_of_group(first, last, ends, grid):
-    """Tiles that the segment may touch in a group of views with offsets first … last: (first, end)."""
+def find_runs(views, first_view, ends, block, offsets, lists, ints):
+    """First covered pixel, number of covered pixels and its place in the band for each view; returns the longest run.
+
+    block = (first column, end column, sample_x, place of the row in the band, words from view to view).
+    """
     x1, p1, x2, p2 = ends
-    per_column = ONE / np.float32(grid.columns)  # a power of two: exact
-    left = min(x1 + first * p1, x1 + last * p1) * per_column
-    right = max(x2 + first * p2, x2 + last * p2) * per_column
-    limit = np.float32(grid.across)
-    return np.int32(min(max(left, ZERO), limit)), np.int32(np.ceil(min(max(right, ZERO), limit)))
+    low, high, sample_x, row, stride = block
+    longest = np.int32(0)
+    for v in range(views):
+        offset = offsets[first_view + v]
+        start = min(max(np.ceil(x1 + offset * p1 - sample_x), low), high)
+        end = min(max(np.ceil(x2 + offset * p2 - sample_x), low), high)
+        lists[START + v] = start
+        lists[RUN + v] = end - start
+    for v in range(views):
+        ints[BASE + v] = row + np.int32(v) * stride + np.int32(lists[START + v] - low)
+    for v in range(views):
+        longest = max(longest, np.int32(lists[RUN + v]))
+    return longest
 
 
 @inlined
-def set_ends(lanes, lane_offsets, group, ends, lists):
-    """Both ends of the segment for the 16 lanes of a group of views."""
-    x1, p1, x2, p2 = ends
-    first = np.uint64(group) * LANES
-    for i in range(lanes):
-        offset = lane_offsets[first + i]
-        lists[LEFT + i] = x1 + offset * p1
-        lists[RIGHT + i] = x2 + offset * p2
+def make_words(views, first_view, k, sample_x, ends, depths, color, offsets, lists, words):
+    """The k-th covered sample of each view, with its interpolated colour; 0 beyond a view's run."""
+    step = np.float32(k)
+    at = step + sample_x
+    for v in range(views):
+        _, z, u = hit(lists[START + v] + at, offsets[first_view + v], ends, depths)
+        words[np.uint64(2) * v] = plain_color(u, color)
+        words[np.uint64(2) * v + np.uint64(1)] = np.float32(z if step < lists[RUN + v] else ZERO).view(np.int32)
 
 
 @inlined
-def draw_segment_plain(lane_offsets, row_tile, ends, depths, grid, scratch):
-    """Draw one segment in every view; its colour is interpolated."""
-    band, segment, lists = scratch.band, scratch.segment, scratch.lists
-    columns = np.float32(grid.columns)
+def keep_nearer(views, k, ints, words, band):
+    """Depth test and store of one sample per view."""
+    for v in range(views):
+        a = np.uint64(ints[BASE + v] + k)
+        old, new = band[a], words[v]
+        band[a] = new if nearer(new, old) else old
+
+
+@inlined
+def list_visible(views, first_view, k, n, at, offsets, lists, ints, band):
+    """Depth test of one sample per view; the visible ones join the list, whose new length is returned."""
+    for v in range(views):
+        a = np.uint64(ints[BASE + v] + k)
+        old = band[a]
+        z = lists[LANE_Z + v]
+        new = word(z, np.int32(0))
+        visible = nearer(new, old)
+        band[a] = new if visible else old
+        ints[ADDRESS + n] = np.int32(a)
+        lists[U + n] = lists[LANE_U + v]
+        lists[Z + n] = z
+        lists[X + n] = lists[START + v] + at
+        lists[OFFSET + n] = offsets[first_view + v]
+        n += np.uint64(visible)
+    return n
+
+
+@inlined
+def test_lanes(views, first_view, k, sample_x, ends, depths, offsets, lists):
+    """Inverse depth (0 beyond a view's run) and perspective parameter of the k-th covered sample of each view."""
+    step = np.float32(k)
+    at = step + sample_x
+    for v in range(views):
+        _, z, u = hit(lists[START + v] + at, offsets[first_view + v], ends, depths)
+        lists[LANE_U + v] = u
+        lists[LANE_Z + v] = z if step < lists[RUN + v] else ZERO
+
+
+@inlined
+def draw_segment(block, ends, depths, plain, shader, shading, offsets, band, segment, lists, ints, words, halves):
+    """Draw one segment in every view; shading = (material, side, row, gradient)."""
+    low, high, sample_x, row, stride = block
+    material, side, geometry, gradient = shading
     color = (segment[0], segment[1], segment[2], segment[16], segment[17], segment[18])
-    for g in range(grid.groups):
-        k = np.uint64(g) * LANES
-        tile0, tile1 = tiles_of_group(lane_offsets[k], lane_offsets[k + np.uint64(15)], ends, grid)
-        if tile0 >= tile1:
-            continue
-        set_ends(np.uint64(grid.lanes), lane_offsets, g, ends, lists)
-        row = row_tile + g * grid.across
-        for tile in range(tile0, tile1):
-            draw_tile_plain(row + tile, np.float32(tile) * columns, depths, color, band, lists)
-
-
-@inlined
-def draw_segment_listed(lane_offsets, row_tile, ends, depths, grid, shape, surface, lighting, scratch):
-    """Draw one segment in every view; visible samples are listed and then shaded."""
-    band, lists, ints = scratch.band, scratch.lists, scratch.ints
-    columns = np.float32(grid.columns)
     n = np.uint64(0)
-    for g in range(grid.groups):
-        k = np.uint64(g) * LANES
-        tile0, tile1 = tiles_of_group(lane_offsets[k], lane_offsets[k + np.uint64(15)], ends, grid)
-        if tile0 >= tile1:
-            continue
-        set_ends(np.uint64(grid.lanes), lane_offsets, g, ends, lists)
-        row = row_tile + g * grid.across
-        for tile in range(tile0, tile1):
-            x = np.float32(tile) * columns
-            mask = test_tile(row + tile, x, depths, band, lists)
-            address = np.int32((row + tile) * 32 + 16)
-            while mask != 0:
-                i = lowest_lane(mask)
-                mask &= mask - np.int32(1)
-                lists[U + n] = lists[TILE_U + i]
-                lists[Z + n] = lists[TILE_Z + i]
-                lists[X + n] = x + lists[COLUMN + i]
-                lists[OFFSET + n] = lane_offsets[k + i]
-                ints[ADDRESS + n] = address + np.int32(i)
-                n += np.uint64(1)
-            if n > np.uint64(CAPACITY - 16):
-                shade(n, surface, lighting, shape, scratch)
+    for first in range(0, offsets.shape[0], VIEWS_AT_ONCE):
+        first_view = np.uint64(first)
+        views = np.uint64(min(VIEWS_AT_ONCE, offsets.shape[0] - first))
+        here = (low, high, sample_x, row + np.int32(first) * stride, stride)
+        longest = find_runs(views, first_view, ends, here, offsets, lists, ints)
+        for k in range(longest):
+            if plain:
+                make_words(views, first_view, k, sample_x, ends, depths, color, offsets, lists, halves)
+                keep_nearer(views, k, ints, words, band)
+                continue
+            test_lanes(views, first_view, k, sample_x, ends, depths, offsets, lists)
+            n = list_visible(views, first_view, k, n, np.float32(k) + sample_x, offsets, lists, ints, band)
+            if n > np.uint64(CAPACITY) - views:
+                shade(n, shader, material, side, geometry, gradient, segment, lists, ints)
                 scatter(n, band, ints)
                 n = np.uint64(0)
     if n > np.uint64(0):
-        shade(n, surface, lighting, shape, scratch)
+        shade(n, shader, material, side, geometry, gradient, segment, lists, ints)
         scatter(n, band, ints)
 
 
 @inlined
-def draw_band(rows, bin_index, surface, camera, lighting, lane_offsets, sample_y, grid, scratch):
-    """Draw rows (first, end) of every view into the band; sample_y is the sample's place within its row."""
-    columns = segment_columns(surface, lighting)
-    triangles = surface.triangles
+def draw_block(rows, columns, bin_index, surface, camera, shader, offsets, sample, scratch):
+    """Draw rows (first, end) and columns (first, end) of every view; sample = (x, y) of the sample in its pixel."""
+    vertices, attributes, uv, wanted = surface.vertices, surface.attributes, surface.uv, surface.columns
+    triangles, bins, face_material, materials = (
+        surface.triangles, surface.bins, surface.face_material, surface.materials,
+    )
+    band, segment, lists, ints, words = scratch.band, scratch.segment, scratch.lists, scratch.ints, scratch.words
+    halves = scratch.halves
+    sample_x, sample_y = np.float32(sample[0]), sample[1]
+    stride = np.int32(columns[1] - columns[0])
+    row_words = offsets.shape[0] * (columns[1] - columns[0])
     for entry in range(surface.bin_start[bin_index], surface.bin_start[bin_index + 1]):
-        index = surface.bins[entry]
+        index = np.uint64(bins[entry])
         code = triangles[index, 3]
-        corners = (triangles[index, 0], triangles[index, 1], triangles[index, 2], code & 1)
-        m = surface.face_material[code >> 1]
-        sides = 2 if surface.materials[m, 4] != ZERO else 1
-        textured = surface.materials[m, 5] >= ZERO
-        plain = is_plain(surface, lighting, m)
-        gradient = uv_gradient(surface, corners, camera) if textured else NO_GRADIENT
-        row0, row1 = rows_of(surface.vertices, corners, sample_y, rows[0], rows[1])
+        corners = (np.uint64(triangles[index, 0]), np.uint64(triangles[index, 1]), np.uint64(triangles[index, 2]))
+        m = np.uint64(face_material[code >> 1])
+        sides = 2 if materials[m, 4] != ZERO else 1
+        material = (materials[m, 0], materials[m, 1], materials[m, 2], materials[m, 3], materials[m, 5])
+        textured, plain = materials[m, 5] >= ZERO, not shader.per_sample and materials[m, 6] != ZERO
+        gradient = uv_gradient(vertices, uv, corners, camera) if textured else NO_GRADIENT
+        row0, row1 = rows_of(vertices, corners, sample_y, rows[0], rows[1])
         for r in range(row0, row1):
             y = r + sample_y
-            left, right = cut_triangle(surface.vertices, corners, y, camera)
-            row_tile = (r - rows[0]) * grid.groups * grid.across
+            left, right = cut_triangle(vertices, corners, code & 1, y, camera)
+            block = (
+                np.float32(columns[0]), np.float32(columns[1]), sample_x, np.int32((r - rows[0]) * row_words), stride,
+            )
             for side in range(sides):
                 if side == 1:
                     left, right = right, left
                 ends, depths = (left[0], left[2], right[0], right[2]), (left[1], right[1])
-                first = 6 if side == 1 and not lighting.per_sample else 0
-                fill_segment(surface, lighting, left, right, first, columns, scratch.segment)
-                if plain:
-                    draw_segment_plain(lane_offsets, row_tile, ends, depths, grid, scratch)
-                else:
-                    if textured:
-                        fill_uv(surface, corners, left, right, scratch.segment)
-                    shape = (m, side, row_geometry(y, camera), gradient)
-                    draw_segment_listed(
-                        lane_offsets, row_tile, ends, depths, grid, shape, surface, lighting, scratch
-                    )
+                first = 6 if side == 1 and not shader.per_sample else 0
+                fill_segment(attributes, left, right, first, wanted, segment)
+                if textured:
+                    fill_uv(uv, corners, left, right, segment)
+                shading = (material, side, row_geometry(y, camera), gradient)
+                draw_segment(block, ends, depths, plain, shader, shading, offsets, band, segment, lists, ints, words, halves)
 
 
 @inlined
-def copy_row(source, stride, columns, target, first, width, out):
-    """Copy one view's row out of its tiles, `columns` samples from each."""
-    whole = width // columns
-    if columns >= 4:
-        for j in range(columns // 4):
-            s, d = source + np.uint64(4 * j), np.uint64(first + 4 * j)
-            for _ in range(whole):
-                a, b = target[s], target[s + np.uint64(1)]
-                c, e = target[s + np.uint64(2)], target[s + np.uint64(3)]
-                out[d], out[d + np.uint64(1)], out[d + np.uint64(2)], out[d + np.uint64(3)] = a, b, c, e
-                s += stride
-                d += np.uint64(columns)
-    else:
-        for j in range(columns):
-            s, d = source + np.uint64(j), np.uint64(first + j)
-            for _ in range(whole):
-                out[d] = target[s]
-                s += stride
-                d += np.uint64(columns)
-    for j in range(width - whole * columns):
-        out[np.uint64(first + whole * columns + j)] = target[source + np.uint64(whole) * stride + np.uint64(j)]
-
-
-@inlined
-def view_start(row, view, grid):
-    """Index in the band of the first colour of a view's row."""
-    tile = np.uint64((row * grid.groups + view // grid.views) * grid.across)
-    return tile * TILE + LANES + np.uint64(view % grid.views * grid.columns)
-
-
-@inlined
-def store_views(rows, grid, band, out):
-    """Copy the band's colours to the pictures (V, H, W) int32."""
-    views, height, width = out.shape
-    line = out.reshape(-1)
+def store_views(rows, columns, height, width, views, band, line):
+    """Copy the band's colours to the pictures, which are `line`, (V·H·W,) int32."""
+    k = np.uint64(0)
+    count = np.uint64(columns[1] - columns[0])
     for r in range(rows[0], rows[1]):
         for view in range(views):
-            start = view_start(r - rows[0], view, grid)
-            copy_row(start, TILE, grid.columns, band, (view * height + r) * width, width, line)
+            first = np.uint64((view * height + r) * width + columns[0])
+            for x in range(count):
+                line[first + x] = np.int32(band[k + x] & COLOR_MASK)
+            k += count
 
 
 @inlined
-def store_depth(rows, focal, grid, band, nearest, out):
+def store_background(rows, columns, height, width, views, background, line):
+    """Fill the pictures where there is nothing to draw."""
+    count = np.uint64(columns[1] - columns[0])
+    for r in range(rows[0], rows[1]):
+        for view in range(views):
+            first = np.uint64((view * height + r) * width + columns[0])
+            for x in range(count):
+                line[first + x] = background
+
+
+@inlined
+def store_depth(rows, columns, focal, band, nearest, out):
     """Write eye depth (V, H, W), inf where empty; with `nearest`, keep what is nearer."""
-    views, _, width = out.shape
+    k = np.uint64(0)
     for r in range(rows[0], rows[1]):
-        for view in range(views):
-            start = view_start(r - rows[0], view, grid) - LANES
-            for x in range(width):
-                k = start + np.uint64(x // grid.columns) * TILE + np.uint64(x % grid.columns)
-                depth = focal / np.int32(band[k]).view(np.float32)
+        for view in range(out.shape[0]):
+            for x in range(columns[0], columns[1]):
+                depth = focal / np.int32(band[k] >> DEPTH_SHIFT).view(np.float32)
                 out[view, r, x] = min(depth, out[view, r, x]) if nearest else depth
+                k += np.uint64(1)
 
 
 @inlined
-def add_samples(rows, views, width, grid, band, sums):
+def add_samples(count, band, sums):
     """Add the band's colours to the sums, four channels a pixel."""
-    k = 0
-    for r in range(rows[1] - rows[0]):
-        for view in range(views):
-            start = view_start(r, view, grid)
-            for x in range(width):
-                rgba = band[start + np.uint64(x // grid.columns) * TILE + np.uint64(x % grid.columns)]
-                for c in range(4):
-                    sums[k + c] += np.uint16((rgba >> np.int32(8 * c)) & np.int32(255))
-                k += 4
+    for k in range(count):
+        for c in range(4):
+            sums[4 * k + c] += np.uint16((band[k] >> np.int64(8 * c)) & np.int64(255))
 
 
 @inlined
-def store_means(rows, samples, sums, out):
+def store_means(rows, columns, samples, sums, out):
     """Write the rounded means of the sums to the pictures, and clear the sums."""
-    views, _, width = out.shape
     k = 0
     half = samples // 2
     for r in range(rows[0], rows[1]):
-        for view in range(views):
-            for x in range(width):
+        for view in range(out.shape[0]):
+            for x in range(columns[0], columns[1]):
                 rgba = np.int32(0)
                 for c in range(4):
                     rgba |= np.int32((np.int64(sums[k + c]) + half) // samples) << np.int32(8 * c)
@@ -216,26 +222,30 @@ def store_means(rows, samples, sums, out):
 
 
 @kernel
-def draw_views(bands, surface, camera, lighting, lane_offsets, background, grid, side, scratch, out, depth):
-    """Draw bands (first, end, rows per band) of every view into out (V, H, W) int32.
+def draw_views(bins, surface, camera, shader, offsets, background, side, scratch, out, depth):
+    """Draw bins (first, end, rows per band, blocks a row, columns per block) of every view into out (V, H, W) int32.
 
     side² samples a pixel; depth (V, H, W) float32, or of no size when it is not wanted.
     """
     views, height, width = out.shape
-    for k in range(bands[0], bands[1]):
-        rows = (k * bands[2], min((k + 1) * bands[2], height))
-        for sample in range(side * side):
-            sample_x = np.float32((sample % side + 0.5) / side)
-            for i in range(16):
-                scratch.lists[COLUMN + np.uint64(i)] = np.float32(i % grid.columns) + sample_x
-            clear_tiles((rows[1] - rows[0]) * grid.groups * grid.across, background, scratch.band)
-            sample_y = (sample // side + 0.5) / side
-            draw_band(rows, k, surface, camera, lighting, lane_offsets, sample_y, grid, scratch)
+    line = out.reshape(-1)
+    for k in range(bins[0], bins[1]):
+        first_row, first_column = k // bins[3] * bins[2], k % bins[3] * bins[4]
+        rows = (first_row, min(first_row + bins[2], height))
+        columns = (first_column, min(first_column + bins[4], width))
+        if surface.bin_start[k] == surface.bin_start[k + 1] and depth.size == 0:
+            store_background(rows, columns, height, width, views, background, line)
+            continue
+        count = (rows[1] - rows[0]) * views * (columns[1] - columns[0])
+        for s in range(side * side):
+            clear_samples(count, background, scratch.band)
+            sample = ((s % side + 0.5) / side, (s // side + 0.5) / side)
+            draw_block(rows, columns, k, surface, camera, shader, offsets, sample, scratch)
             if side > 1:
-                add_samples(rows, views, width, grid, scratch.band, scratch.sums)
+                add_samples(count, scratch.band, scratch.sums)
             if depth.size > 0:
-                store_depth(rows, np.float32(camera.focal), grid, scratch.band, sample > 0, depth)
+                store_depth(rows, columns, np.float32(camera.focal), scratch.band, s > 0, depth)
         if side > 1:
-            store_means(rows, side * side, scratch.sums, out)
+            store_means(rows, columns, side * side, scratch.sums, out)
         else:
-            store_views(rows, grid, scratch.band, out)
+            store_views(rows, columns, height, width, views, scratch.band, line)

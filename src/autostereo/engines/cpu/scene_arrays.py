@@ -19,7 +19,7 @@ class SceneArrays(NamedTuple):
 
     positions (N, 3) float64, normals and colors (N, 3) float32, uv (N, 2) float64, or (0, 0) without textures, vertex_material (N,) int32,
     faces (F, 3) int32, face_material (F,) int32, materials (M, 8) float32: ambient, diffuse, specular, shininess,
-    two-sided, texture or −1; texels int32 (RGBA); texture_levels (T, L, 3) int64: first texel, width, height;
+    two-sided, texture or −1, plain (no texture, no highlight), 0; texels int32 (RGBA); texture_levels (T, L, 3) int64: first texel, width, height;
     level_count (T,) int64.
     """
 
@@ -88,8 +88,9 @@ def scene_arrays(scene: Scene) -> SceneArrays:
         texture = -1
         if mesh.texture is not None:
             texture = images.setdefault(id(mesh.texture), (len(images), mesh.texture))[0]
-        materials[m, :6] = (
+        materials[m, :7] = (
             material.ambient, material.diffuse, material.specular, material.shininess, mesh.two_sided, texture,
+            texture < 0 and material.specular == 0,
         )
         parts["p"].append(apply(mesh.transform, mesh.vertices))
         parts["n"].append(apply_normals(mesh.transform, mesh.shading_normals).astype(np.float32))
