@@ -115,10 +115,11 @@ def random_scene(draw_integers, texture: bool) -> aus.Scene:
     """
     n = int(draw_integers(3, 9, 1)[0])
     depth = np.array([0.0, 0.1, 0.2, 0.5, 1, 2, 3, 4, 4, 5, 8, 20, 100])[draw_integers(0, 12, n)]
-    depth[0] = max(depth[0], 4.0)  # a scene wholly behind the cameras is refused
+    depth[0] = max(depth[0], 4.0)
     x, y = draw_integers(-12, 12, n) / 12, draw_integers(-9, 9, n) / 12
     vertices = np.stack([x * np.maximum(depth, 1), y * np.maximum(depth, 1), 4 - depth], axis=1)
     faces = draw_integers(0, n - 1, 3 * int(draw_integers(1, 12, 1)[0])).reshape(-1, 3)
+    faces[0, 0] = 0  # a scene wholly behind the cameras is refused
     fields = {"colors": draw_integers(0, 255, 3 * n).reshape(n, 3).astype(np.uint8)}
     if texture:
         fields["uv"] = draw_integers(-16, 16, 2 * n).reshape(n, 2) / 4
