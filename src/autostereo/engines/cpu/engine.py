@@ -39,18 +39,19 @@ class Prepared:
 
     scene: Scene
     arrays: SceneArrays
+    face_ids: NDArray[np.int32]
     buffers: dict[str, NDArray[Any]] = field(default_factory=dict)
     pools: dict[tuple[Any, ...], Pool] = field(default_factory=dict)
     plan: tuple[Any, ...] | None = None
     lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def plans(self, draw: Draw, groups: int) -> Plans:
+    def plans(self, draw: Draw) -> Plans:
         """The plans of the panel's rows, those of the frame before if they still fit."""
         assert draw.viewmap is not None
-        key = (draw.viewmap, draw.camera.width, draw.camera.height, draw.flip_x, draw.flip_y, groups, draw.offsets.tobytes())
+        key = (draw.viewmap, draw.camera.width, draw.camera.height, draw.flip_x, draw.flip_y, draw.offsets.tobytes())
         if self.plan is None or self.plan[0] != key:
             size = (draw.camera.width, draw.camera.height)
-            self.plan = key, make_plans(draw.viewmap, size, (draw.flip_x, draw.flip_y), draw.offsets, groups)
+            self.plan = key, make_plans(draw.viewmap, size, (draw.flip_x, draw.flip_y), draw.offsets)
         return self.plan[1]
 
     def pool(self, key: tuple[Any, ...], make: Any) -> Pool:
@@ -78,7 +79,8 @@ class CpuEngine:
 
     def prepare(self, scene: Scene) -> Prepared:
         """Gather the scene's meshes, textures and materials."""
-        return Prepared(scene, scene_arrays(scene))
+        arrays = scene_arrays(scene)
+        return Prepared(scene, arrays, np.arange(len(arrays.faces), dtype=np.int32))
 
     def draw(self, prepared: Prepared, draw: Draw, target: Target) -> None:
         """Draw a stack of views, or straight to the panel."""
@@ -133,7 +135,7 @@ class CpuEngine:
         side = round(draw.options.samples**0.5)
         flips = (draw.flip_x, draw.flip_y)
         panel = PanelNumbers(gather.map_args(draw.viewmap), *flips, draw.options.sampling == "subpixel")
-        plans = prepared.plans(draw, offset_groups(surface, camera, draw.offsets))
+        plans = prepared.plans(draw)
         total = plans.x.shape[1]
         sums = 3 * width if side > 1 else 0
         pool = prepared.pool(("panel", total, sums), lambda: (new_row(total), new_scratch(total, sums)))
@@ -189,20 +191,6 @@ def view_blocks(views: int, width: int) -> tuple[int, int]:
     return block, int(np.clip(BAND_BYTES // (8 * views * block), 1, 16))
 
 
-def offset_groups(surface: Surface, camera: CameraNumbers, offsets: NDArray[np.float64]) -> int:
-    """Into how many groups of offsets a panel's rows are best sorted.
-
-    A segment visits in each of G groups 3/G of the sub-pixels along its width and along the parallax/G pixels by which it
-    slides within the group: few groups mean long stretches, many groups many short ones.
-    """
-    shown = surface.bins[: surface.bin_start[-1]]
-    if len(shown) == 0:
-        return 1
-    tops = surface.triangles[shown[:: max(1, len(shown) // 1000)], 0]
-    parallax = camera.fx / camera.focal * np.abs(1.0 - surface.vertices[tops, 2]) * np.ptp(offsets)
-    return int(np.clip(2 ** round(np.log2(max(float(np.median(parallax)), 1.0) / 4) / 2), 1, 16))
-
-
 def surface_at(prepared: Prepared, draw: Draw, bins: tuple[int, int, int]) -> tuple[Surface, CameraNumbers, Shader]:
     """Project, light, clip, cull and bin the scene's triangles; bins = (rows per band, columns per block, blocks)."""
     arrays, camera, options = prepared.arrays, draw.camera, draw.options
@@ -217,21 +205,20 @@ def surface_at(prepared: Prepared, draw: Draw, bins: tuple[int, int, int]) -> tu
     vertices = prepared.buffer("vertices", (count, 3), np.float64)
     attributes = prepared.buffer("attributes", (count, 12 if two_sided and not per_sample else 6), np.float32)
 
+    behind: list[int] = []
+
     def vertex_stage(first: int, last: int) -> None:
-        project_vertices(first, last, arrays.positions, e, numbers, vertices)
+        behind.append(project_vertices(first, last, arrays.positions, e, numbers, vertices))
         if per_sample:
             turn_normals(first, last, arrays.normals, arrays.colors, e, attributes)
         else:
             light_vertices(first, last, arrays, e, numbers, lights, attributes)
 
     run_rows(count, vertex_stage, VERTEX_CHUNK)
-    faces, face_ids, uv = arrays.faces, prepared.buffer("ids", (len(arrays.faces),), np.int32), arrays.uv
-    face_ids[:] = np.arange(len(faces), dtype=np.int32)
-    crossing = count_crossing(faces, vertices)
-    behind = bool((vertices[:, 2] < 0).any())
-    if behind:
+    faces, face_ids, uv = arrays.faces, prepared.face_ids, arrays.uv
+    if any(behind):
         faces, face_ids, vertices, attributes, uv = _clipped(
-            arrays, e, numbers, crossing, (faces, face_ids, vertices, attributes, uv)
+            arrays, e, numbers, (faces, face_ids, vertices, attributes, uv)
         )
     side = round(options.samples**0.5)
     bands = (bins[0], 0.5 / side, 1.0 - 0.5 / side, float(bins[1]), bins[2])
@@ -248,9 +235,10 @@ def surface_at(prepared: Prepared, draw: Draw, bins: tuple[int, int, int]) -> tu
     return surface, numbers, shader
 
 
-def _clipped(arrays: SceneArrays, e: Any, camera: CameraNumbers, crossing: int, held: tuple[Any, ...]) -> tuple[Any, ...]:
+def _clipped(arrays: SceneArrays, e: Any, camera: CameraNumbers, held: tuple[Any, ...]) -> tuple[Any, ...]:
     """Triangles cut at the near plane, in arrays with room for the new vertices."""
     faces, face_ids, vertices, attributes, uv = held
+    crossing = count_crossing(faces, vertices)
     room = 2 * crossing
 
     def grown(a: NDArray[Any]) -> NDArray[Any]:

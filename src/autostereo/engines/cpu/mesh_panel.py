@@ -12,12 +12,15 @@ import numpy as np
 
 from .jit import inlined, kernel
 from .mesh_raster import cut_triangle, fill_segment, fill_uv, row_geometry, rows_of, shade, uv_gradient
-from .mesh_shade import ADDRESS, CAPACITY, LANE_U, LANE_Z, OFFSET, U, X, Z, ZERO
+from .mesh_shade import (
+    ADDRESS, BASE, CAPACITY, END, LANE_OFFSET, LANE_U, LANE_X, LANE_Z, OFFSET, PLACE, RUN, START, U, X, Z, ZERO,
+)
 from .mesh_views import NO_GRADIENT
 from .panel_plan import CELL, PAD, row_offsets
 from .samples import COLOR_MASK, clear_samples, hit, nearer, plain_color, scatter, word
 
 STRETCH = np.uint64(512)  # samples handled at once
+ACROSS = 12  # longest stretch that is drawn across groups
 
 
 class PanelNumbers(NamedTuple):
@@ -27,19 +30,6 @@ class PanelNumbers(NamedTuple):
     flip_x: bool
     flip_y: bool
     subpixel: bool
-
-
-@inlined
-def stretch_of_group(g, ends, width, shift, margin, first, bounds):
-    """Samples of group g that the segment may cover: (first, end)."""
-    x1, p1, x2, p2 = ends
-    low, high = bounds[0, g], bounds[1, g]
-    left = min(x1 + low * p1, x1 + high * p1) - np.float32(1.0)
-    right = max(x2 + low * p2, x2 + high * p2) + np.float32(1.0)
-    limit = np.float32(width)
-    start = np.int32(min(max(left, ZERO), limit)) - shift + margin
-    end = np.int32(np.ceil(min(max(right, ZERO), limit))) - shift + margin
-    return first[start // CELL, g], first[(end + CELL - 1) // CELL, g]
 
 
 @inlined
@@ -87,15 +77,112 @@ def list_visible(count, k, n, at, x, offset, lists, ints, band):
 
 
 @inlined
+def find_stretches(ends, width, shift, margin, first, bounds, lists, ints):
+    """Stretch of every group that the segment may cover; returns the longest length but for the last, the misfits'."""
+    x1, p1, x2, p2 = ends
+    groups = np.uint64(bounds.shape[1])
+    limit = np.float32(width)
+    for g in range(groups):
+        low, high = bounds[0, g], bounds[1, g]
+        left = min(x1 + low * p1, x1 + high * p1) - np.float32(1.0)
+        right = max(x2 + low * p2, x2 + high * p2) + np.float32(1.0)
+        lists[START + g] = min(max(left, ZERO), limit)
+        lists[RUN + g] = np.ceil(min(max(right, ZERO), limit))
+    longest = np.int32(0)
+    move = np.int32(margin) - np.int32(shift)
+    for g in range(groups):
+        start = np.uint64((np.int32(lists[START + g]) + move) // np.int32(CELL))
+        end = np.uint64((np.int32(lists[RUN + g]) + move + np.int32(CELL - 1)) // np.int32(CELL))
+        k, stop = first[start, g], first[end, g]
+        ints[BASE + g], ints[END + g] = k, stop
+        if g < groups - np.uint64(1):
+            longest = max(longest, stop - k)
+    return longest
+
+
+@inlined
+def take_lanes(groups, longest, nothing, x, offset, lists, ints):
+    """Bring the stretches of all groups together, the first sample of each, the second, …; returns their number.
+
+    `nothing`, a sample that nothing covers, stands in beyond a group's end. All are brought before any is used: a SIMD
+    load right after the single stores would have to wait for them.
+    """
+    n = np.uint64(0)
+    for k in range(longest):
+        for g in range(groups):
+            j = ints[BASE + g] + np.int32(k)
+            j = j if j < ints[END + g] else nothing
+            ints[PLACE + n] = j
+            lists[LANE_X + n] = x[np.uint64(j)]
+            lists[LANE_OFFSET + n] = offset[np.uint64(j)]
+            n += np.uint64(1)
+    return n
+
+
+@inlined
+def make_lane_words(groups, at, ends, depths, color, lists, halves):
+    """Words of the lanes; 0 where the segment does not cover them."""
+    for g in range(groups):
+        covered, z, u = hit(lists[LANE_X + g] + at, lists[LANE_OFFSET + g], ends, depths)
+        halves[np.uint64(2) * g] = plain_color(u, color)
+        halves[np.uint64(2) * g + np.uint64(1)] = np.float32(z if covered else ZERO).view(np.int32)
+
+
+@inlined
+def keep_nearer_lanes(groups, ints, words, band):
+    """Depth test and store of the lanes."""
+    for g in range(groups):
+        a = np.uint64(ints[PLACE + g])
+        old, new = band[a], words[g]
+        band[a] = new if nearer(new, old) else old
+
+
+@inlined
+def list_visible_lanes(groups, n, at, ends, depths, lists, ints, band):
+    """Depth test of the lanes; the visible ones join the list, whose new length is returned."""
+    for g in range(groups):
+        covered, z, u = hit(lists[LANE_X + g] + at, lists[LANE_OFFSET + g], ends, depths)
+        lists[LANE_U + g] = u
+        lists[LANE_Z + g] = z if covered else ZERO
+    for g in range(groups):
+        a = np.uint64(ints[PLACE + g])
+        old = band[a]
+        z = lists[LANE_Z + g]
+        new = word(z, np.int32(0))
+        visible = nearer(new, old)
+        band[a] = new if visible else old
+        ints[ADDRESS + n] = np.int32(a)
+        lists[U + n] = lists[LANE_U + g]
+        lists[Z + n] = z
+        lists[X + n] = lists[LANE_X + g] + at
+        lists[OFFSET + n] = lists[LANE_OFFSET + g]
+        n += np.uint64(visible)
+    return n
+
+
+@inlined
 def draw_segment(width, shift, margin, ends, depths, plain, shader, shading, first, bounds, at, x, offset, band, segment,
                  lists, ints, words, halves):
-    """Draw one segment in every sub-pixel; shading = (material, side, row, gradient)."""
+    """Draw one segment in every sub-pixel; shading = (material, side, row, gradient).
+
+    Short stretches are drawn across the groups, the first sample of each, the second, …; long ones group by group.
+    """
     material, side, geometry, gradient = shading
     color = (segment[0], segment[1], segment[2], segment[16], segment[17], segment[18])
     n = np.uint64(0)
-    for g in range(bounds.shape[1]):
-        start, end = stretch_of_group(g, ends, width, shift, margin, first, bounds)
-        k, stop = np.uint64(start), np.uint64(max(start, end))
+    groups = np.uint64(bounds.shape[1] - 1)
+    longest = find_stretches(ends, width, shift, margin, first, bounds, lists, ints)
+    nothing = np.int32(x.shape[0] - 1)
+    across = longest <= ACROSS and groups * np.uint64(longest) <= STRETCH
+    if across:
+        count = take_lanes(groups, longest, nothing, x, offset, lists, ints)
+        if plain:
+            make_lane_words(count, at, ends, depths, color, lists, halves)
+            keep_nearer_lanes(count, ints, words, band)
+        else:
+            n = list_visible_lanes(count, n, at, ends, depths, lists, ints, band)
+    for g in range(groups if across else np.uint64(0), groups + np.uint64(1)):
+        k, stop = np.uint64(ints[BASE + g]), np.uint64(ints[END + g])
         while k < stop:
             count = min((stop - k + np.uint64(15)) & ~np.uint64(15), STRETCH)
             if plain:

@@ -31,9 +31,10 @@ class CameraNumbers(NamedTuple):
 def project_vertices(first, last, positions, eye_from_world, camera, vertices):
     """Fill vertices[first:last] = (x at the centre camera, y, focal/depth) from world positions (N, 3).
 
-    The third is −1 for a vertex before the near plane.
+    The third is −1 for a vertex before the near plane; their number is returned.
     """
     e = eye_from_world
+    behind = 0
     for i in range(first, last):
         px, py, pz = positions[i, 0], positions[i, 1], positions[i, 2]
         depth = e[2, 0] * px + e[2, 1] * py + e[2, 2] * pz + e[2, 3]
@@ -41,6 +42,7 @@ def project_vertices(first, last, positions, eye_from_world, camera, vertices):
         y = e[1, 0] * px + e[1, 1] * py + e[1, 2] * pz + e[1, 3]
         if depth < camera.near:
             vertices[i, 0], vertices[i, 1], vertices[i, 2] = 0.0, 0.0, -1.0
+            behind += 1
             continue
         inverse = 1.0 / depth
         vertices[i, 0] = 0.5 * camera.width + camera.fx * x * inverse
@@ -49,6 +51,7 @@ def project_vertices(first, last, positions, eye_from_world, camera, vertices):
             - camera.fy * camera.offset_y / camera.focal
         )
         vertices[i, 2] = camera.focal * inverse
+    return behind
 
 
 @kernel

@@ -17,16 +17,16 @@ STRIDE = 1040  # list capacity: 1024 + one cache line, so that lists do not fall
 CAPACITY = 1024
 
 # rows of the float32 scratch: lanes of samples at hand …
-START, RUN, LANE_U, LANE_Z = (np.uint64(k * STRIDE) for k in range(4))
+START, RUN, LANE_U, LANE_Z, LANE_X, LANE_OFFSET = (np.uint64(k * STRIDE) for k in range(6))
 # … and the list of visible samples
-U, Z, OFFSET, X = (np.uint64((4 + k) * STRIDE) for k in range(4))
-KR, KG, KB, NX, NY, NZ = (np.uint64((8 + k) * STRIDE) for k in range(6))
-DR, DG, DB, SR, SG, SB = (np.uint64((14 + k) * STRIDE) for k in range(6))
-PX, PY, PZ, LOD, TS, TT = (np.uint64((20 + k) * STRIDE) for k in range(6))
-FLOAT_ROWS = 26
+U, Z, OFFSET, X = (np.uint64((6 + k) * STRIDE) for k in range(4))
+KR, KG, KB, NX, NY, NZ = (np.uint64((10 + k) * STRIDE) for k in range(6))
+DR, DG, DB, SR, SG, SB = (np.uint64((16 + k) * STRIDE) for k in range(6))
+PX, PY, PZ, LOD, TS, TT = (np.uint64((22 + k) * STRIDE) for k in range(6))
+FLOAT_ROWS = 28
 # rows of the int32 scratch
-ADDRESS, COLOR, BASE, VISIT_TILE, VISIT_LANE, VISIT_X = (np.uint64(k * STRIDE) for k in range(6))
-INT_ROWS = 6
+ADDRESS, COLOR, BASE, END, PLACE = (np.uint64(k * STRIDE) for k in range(5))
+INT_ROWS = 5
 
 SEGMENT_ATTRIBUTES = 16  # segment[0:16] at the left end, segment[16:32] the difference to the right end
 

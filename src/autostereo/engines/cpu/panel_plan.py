@@ -21,9 +21,10 @@ from ...viewmap import ViewMap, cell_index, offset_at
 from .gather import map_args
 from .jit import inlined, kernel
 
-PHASE_CLASSES = 8  # starting phases for which plans are made
+PHASE_CLASSES = 4  # starting phases for which plans are made
 MARGIN = 16  # steps by which a plan can be moved
-CELL = 4  # pixels per entry of the table from x to samples
+CELL = 2  # pixels per entry of the table from x to samples
+LANES, MAX_LANES = 16, 8  # groups come in whole SIMD registers, but not too many
 PAD = 16  # samples read beyond a plan's end
 NOWHERE = np.int32(-(2**23))
 CELL_PERIODS = {0: (1, 1), 1: (2, 2), 2: (2, 1), 3: (2, 4), 4: (1, 2)}  # of CellPatternMode, in x and y
@@ -78,9 +79,14 @@ def sort_row(group, kind, margin, groups, x, kinds, slot, first, begin):
         x[k], kinds[k], slot[k] = NOWHERE, 0, 3 * width
 
 
-def make_plans(viewmap: ViewMap, size: tuple[int, int], flips: tuple[bool, bool], offsets: NDArray, groups: int) -> Plans:
-    """Make the plans of a panel of size (W, H) for camera offsets (V,), sorted into about `groups` groups."""
+def make_plans(viewmap: ViewMap, size: tuple[int, int], flips: tuple[bool, bool], offsets: NDArray) -> Plans:
+    """Make the plans of a panel of size (W, H) for camera offsets (V,).
+
+    There are about as many groups as sub-pixels behind a lens, or as views of a table, and one for misfits.
+    """
     width, height = size
+    behind_lens = viewmap.views if viewmap.table is not None else 3.0 / max(abs(viewmap.a), 1e-6)
+    groups = LANES * int(np.clip(round(behind_lens / LANES), 1, MAX_LANES))
     rows = np.arange(height)
     physical = height - 1 - rows if flips[1] else rows
     if viewmap.table is not None:
@@ -90,7 +96,7 @@ def make_plans(viewmap: ViewMap, size: tuple[int, int], flips: tuple[bool, bool]
     group = np.minimum((phases * groups).astype(np.int32), groups - 1)
     if misfit > 0:  # near the wrap of the phase an offset may jump from one end to the other
         group[(phases < misfit) | (phases >= 1 - misfit)] = groups
-    count = groups + 1
+    count = groups + 1  # the last one is that of the misfits
     total = 3 * (width + 2 * margin) + PAD
     cells = -(-(width + 2 * margin) // CELL) + 2
     classes = len(phases)
