@@ -140,12 +140,14 @@ class CpuEngine:
         sums = 3 * width if side > 1 else 0
         pool = prepared.pool(("panel", total, sums), lambda: (new_row(total), new_scratch(total, sums)))
         background = background_word(prepared.scene)
+        empty_row = np.tile(np.array([background]).view(np.uint8)[:3], width)
 
         def task(first: int, end: int) -> None:
             with pool as (row_memory, scratch):
                 bands = (first, end, PANEL_ROWS)
                 draw_panel(
-                    bands, surface, camera, shader, panel, plans, background, side, row_memory, scratch, target.color
+                    bands, surface, camera, shader, panel, plans, background, empty_row, side, row_memory, scratch,
+                    target.color,
                 )
 
         run_rows(-(-height // PANEL_ROWS), task)
@@ -178,9 +180,11 @@ def new_scratch(samples: int, sums: int) -> Scratch:
     )
 
 
-def new_row(total: int) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]:
-    """One thread's memory for a panel row of `total` samples: offsets, places, finished values."""
-    return np.zeros(total, np.float32), np.zeros(total, np.float32), np.zeros(total + 3, np.uint8)
+def new_row(total: int) -> tuple[NDArray[Any], ...]:
+    """One thread's memory for a panel row of `total` samples: offsets, places, scratch, finished values."""
+    return (
+        np.zeros(total, np.float32), np.zeros(total, np.float32), np.zeros(total, np.float64), np.zeros(total + 3, np.uint8)
+    )
 
 
 def view_blocks(views: int, width: int) -> tuple[int, int]:

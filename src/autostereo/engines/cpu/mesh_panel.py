@@ -13,13 +13,14 @@ import numpy as np
 from .jit import inlined, kernel
 from .mesh_raster import cut_triangle, fill_segment, fill_uv, row_geometry, rows_of, shade, uv_gradient
 from .mesh_shade import (
-    ADDRESS, BASE, CAPACITY, END, LANE_OFFSET, LANE_U, LANE_X, LANE_Z, OFFSET, PLACE, RUN, START, U, X, Z, ZERO,
+    ADDRESS, BASE, CAPACITY, END, LANE_OFFSET, LANE_U, LANE_X, LANE_Z, OFFSET, ONE, PLACE, RUN, START, U, X, Z, ZERO,
 )
 from .mesh_views import NO_GRADIENT
-from .panel_plan import CELL, PAD, row_offsets
+from .panel_plan import PAD, row_offsets
 from .samples import COLOR_MASK, clear_samples, hit, nearer, plain_color, scatter, word
 
 STRETCH = np.uint64(512)  # samples handled at once
+SLACK = np.float32(4e-3)
 ACROSS = 12  # longest stretch that is drawn across groups
 
 
@@ -77,23 +78,23 @@ def list_visible(count, k, n, at, x, offset, lists, ints, band):
 
 
 @inlined
-def find_stretches(ends, width, shift, margin, first, bounds, lists, ints):
+def find_stretches(ends, at, width, shift, margin, first, bounds, lists, ints):
     """Stretch of every group that the segment may cover; returns the longest length but for the last, the misfits'."""
     x1, p1, x2, p2 = ends
     groups = np.uint64(bounds.shape[1])
     limit = np.float32(width)
+    before, after = at[0], at[1]
     for g in range(groups):
         low, high = bounds[0, g], bounds[1, g]
-        left = min(x1 + low * p1, x1 + high * p1) - np.float32(1.0)
-        right = max(x2 + low * p2, x2 + high * p2) + np.float32(1.0)
-        lists[START + g] = min(max(left, ZERO), limit)
+        left = min(x1 + low * p1, x1 + high * p1) - before
+        right = max(x2 + low * p2, x2 + high * p2) - after
+        lists[START + g] = np.ceil(min(max(left, ZERO), limit))
         lists[RUN + g] = np.ceil(min(max(right, ZERO), limit))
     longest = np.int32(0)
     move = np.int32(margin) - np.int32(shift)
     for g in range(groups):
-        start = np.uint64((np.int32(lists[START + g]) + move) // np.int32(CELL))
-        end = np.uint64((np.int32(lists[RUN + g]) + move + np.int32(CELL - 1)) // np.int32(CELL))
-        k, stop = first[start, g], first[end, g]
+        k = first[np.uint64(np.int32(lists[START + g]) + move), g]
+        stop = first[np.uint64(np.int32(lists[RUN + g]) + move), g]
         ints[BASE + g], ints[END + g] = k, stop
         if g < groups - np.uint64(1):
             longest = max(longest, stop - k)
@@ -171,7 +172,9 @@ def draw_segment(width, shift, margin, ends, depths, plain, shader, shading, fir
     color = (segment[0], segment[1], segment[2], segment[16], segment[17], segment[18])
     n = np.uint64(0)
     groups = np.uint64(bounds.shape[1] - 1)
-    longest = find_stretches(ends, width, shift, margin, first, bounds, lists, ints)
+    # rounding moves an end by less than SLACK; samples at sub-pixels lie anywhere in their pixel
+    reach = (at + SLACK, at - SLACK) if at > ZERO else (ONE, ZERO)
+    longest = find_stretches(ends, reach, width, shift, margin, first, bounds, lists, ints)
     nothing = np.int32(x.shape[0] - 1)
     across = longest <= ACROSS and groups * np.uint64(longest) <= STRETCH
     if across:
@@ -241,54 +244,68 @@ def draw_row(r, bin_index, surface, camera, shader, sample_y, at, shift, margin,
 @inlined
 def set_places(shift, subpixel, part_x, x, slot, places):
     """Place of each sample of a plan, less the sample's place within its pixel if that is the same for all."""
-    for i in range(np.uint64(places.shape[0])):
-        places[i] = np.float32(x[i] + shift)
-        if subpixel:
-            places[i] += np.float32((slot[i] % 3 + part_x) / 3.0)
+    count = np.uint64(places.shape[0])
+    move = np.int32(shift)
+    for i in range(count):
+        places[i] = np.float32(x[i] + move)
+    if subpixel:
+        for i in range(count):
+            places[i] += np.float32(((slot[i] & 3) + part_x) / 3.0)
 
 
 @inlined
 def collect_row(count, slot, band, line):
-    """Bring the row's values (each the channel of its own) into order: line[slot] of every sample."""
+    """Bring the row's values (each the channel of its own) into order: line[place] of every sample."""
     for i in range(np.uint64(count)):
         s = slot[i]
-        line[np.uint64(s)] = np.uint8((band[i] >> np.int64(8 * (s % 3))) & np.int64(255))
+        line[np.uint64(s >> 2)] = np.uint8((band[i] >> np.int64(8 * (s & 3))) & np.int64(255))
 
 
 @inlined
-def store_row(line, begin, flip, out):
-    """Copy the row's values, from line[begin] on, to the panel's row (W, 3)."""
-    width = out.shape[0]
+def store_row(line, begin, flip, row, height_width, out):
+    """Copy the row's values, from line[begin] on, to a row of the panel, which is `out`, (H·W·3,) uint8."""
+    width = height_width[1]
+    target, source = np.uint64(row * width * 3), np.uint64(begin)
+    if not flip:
+        for i in range(np.uint64(3 * width)):
+            out[target + i] = line[source + i]
+        return
     for x in range(width):
-        to = width - 1 - x if flip else x
         for c in range(3):
-            out[to, c] = line[np.uint64(begin + 3 * x + c)]
+            out[target + np.uint64(3 * (width - 1 - x) + c)] = line[source + np.uint64(3 * x + c)]
+
+
+@inlined
+def store_background(row, empty, out):
+    """Copy an empty row (3·W,) to where there is nothing to draw."""
+    count = np.uint64(empty.shape[0])
+    first = np.uint64(row) * count
+    for i in range(count):
+        out[first + i] = empty[i]
 
 
 @kernel
-def draw_panel(bands, surface, camera, shader, panel, plans, background, side, row_memory, scratch, out):
+def draw_panel(bands, surface, camera, shader, panel, plans, background, empty_row, side, row_memory, scratch, out):
     """Draw bands (first, end, rows per band) of the panel into out (H, W, 3) uint8, side² samples a sub-pixel.
 
-    row_memory = (offset (N,) and place (N,) float32 of the row's samples, line (3·W' + 3,) uint8).
+    row_memory = (offset (N,) and place (N,) float32 of the row's samples, scratch (N,) float64, line (N + 3,) uint8).
     """
     height, width, _ = out.shape
-    offset, places, line = row_memory
+    offset, places, u, line = row_memory
+    flat = out.reshape(-1)
     samples = side * side
     for band in range(bands[0], bands[1]):
         empty = surface.bin_start[band] == surface.bin_start[band + 1]
         for r in range(band * bands[2], min((band + 1) * bands[2], height)):
             row = height - 1 - r if panel.flip_y else r
-            target = out[row]
             if empty:
-                for x in range(width):
-                    for c in range(3):
-                        target[x, c] = np.uint8((background >> np.int32(8 * c)) & np.int32(255))
+                store_background(row, empty_row, flat)
                 continue
             c, shift = plans.row_class[r], plans.row_shift[r]
             x, kind, slot, first = plans.x[c], plans.kind[c], plans.slot[c], plans.first[c]
             begin = 3 * (plans.margin - shift)
             count = x.shape[0] - PAD
-            row_offsets(row, width, panel.map, panel.flip_x, x, kind, shift, plans.constants, plans.offsets, offset)
+            row_offsets(row, width, panel.map, panel.flip_x, x, kind, shift, plans.constants, plans.offsets, u, offset)
             for s in range(samples):
                 part_x, part_y = (s % side + 0.5) / side, (s // side + 0.5) / side
                 set_places(shift, panel.subpixel, part_x, x, slot, places)
@@ -301,7 +318,7 @@ def draw_panel(bands, surface, camera, shader, panel, plans, background, side, r
                 collect_row(count, slot, scratch.band, line)
                 if samples > 1:
                     add_row(line, begin, width, s, samples, scratch.sums, line)
-            store_row(line, begin, panel.flip_x, target)
+            store_row(line, begin, panel.flip_x, row, (height, width), flat)
 
 
 @inlined

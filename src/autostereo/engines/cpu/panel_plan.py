@@ -23,7 +23,6 @@ from .jit import inlined, kernel
 
 PHASE_CLASSES = 4  # starting phases for which plans are made
 MARGIN = 16  # steps by which a plan can be moved
-CELL = 2  # pixels per entry of the table from x to samples
 LANES, MAX_LANES = 16, 8  # groups come in whole SIMD registers, but not too many
 PAD = 16  # samples read beyond a plan's end
 NOWHERE = np.int32(-(2**23))
@@ -34,7 +33,7 @@ class Plans(NamedTuple):
     """Sorted samples of a few kinds of rows, N a row.
 
     x, kind, slot (C, N) int32: pixel; which constant of the map gives its phase (cell·3 + channel), or its view for
-    tables; place in the finished row. first (C, cells, G) and begin (C, G + 1) int32: first sample of each group at
+    tables; 4 × place in the finished row + channel. first (C, W' + 1, G) and begin (C, G + 1) int32: first sample of each group at
     or right of a pixel, and of all. bounds (2, G) float32: least and greatest offset in a group. row_class, row_shift
     (H,) int32. constants: the map's phase constants in one line; offsets (V,) float64 of the views.
     """
@@ -65,18 +64,16 @@ def sort_row(group, kind, margin, groups, x, kinds, slot, first, begin):
         begin[g + 1] += begin[g]
     cursor = begin[:groups].copy()
     for i in range(width):
-        if i % CELL == 0:
-            for g in range(groups):
-                first[i // CELL, g] = cursor[g]
+        for g in range(groups):
+            first[i, g] = cursor[g]
         for c in range(3):
             k = cursor[group[i, c]]
             cursor[group[i, c]] += 1
-            x[k], kinds[k], slot[k] = i - margin, kind[i, c], 3 * i + c
-    for cell in range((width + CELL - 1) // CELL, first.shape[0]):
-        for g in range(groups):
-            first[cell, g] = begin[g + 1]
+            x[k], kinds[k], slot[k] = i - margin, kind[i, c], 4 * (3 * i + c) + c
+    for g in range(groups):
+        first[width, g] = begin[g + 1]
     for k in range(begin[groups], x.shape[0]):
-        x[k], kinds[k], slot[k] = NOWHERE, 0, 3 * width
+        x[k], kinds[k], slot[k] = NOWHERE, 0, 4 * 3 * width
 
 
 def make_plans(viewmap: ViewMap, size: tuple[int, int], flips: tuple[bool, bool], offsets: NDArray) -> Plans:
@@ -98,11 +95,10 @@ def make_plans(viewmap: ViewMap, size: tuple[int, int], flips: tuple[bool, bool]
         group[(phases < misfit) | (phases >= 1 - misfit)] = groups
     count = groups + 1  # the last one is that of the misfits
     total = 3 * (width + 2 * margin) + PAD
-    cells = -(-(width + 2 * margin) // CELL) + 2
     classes = len(phases)
     plans = Plans(
         np.empty((classes, total), np.int32), np.empty((classes, total), np.int32), np.empty((classes, total), np.int32),
-        np.empty((classes, cells, count), np.int32), np.empty((classes, count + 1), np.int32),
+        np.empty((classes, width + 2 * margin + 1, count), np.int32), np.empty((classes, count + 1), np.int32),
         _bounds(viewmap, offsets, groups, misfit), row_class.astype(np.int32), row_shift.astype(np.int32),
         map_args(viewmap).offsets.ravel(), np.ascontiguousarray(offsets, dtype=np.float64), margin,
     )
@@ -168,26 +164,40 @@ def _bounds(viewmap: ViewMap, offsets: NDArray, groups: int, misfit: float) -> N
 
 
 @inlined
-def row_offsets(row, width, m, flip, x, kind, shift, constants, offsets, out):
-    """Camera offset (N,) float32 of a plan's samples in physical row `row`; the phase is that of `row_camera`."""
-    views, last = m.views, offsets.shape[0] - 1
+def row_offsets(row, width, m, flip, x, kind, shift, constants, offsets, u, out):
+    """Camera offset (N,) float32 of a plan's samples in physical row `row`; the phase is that of `gather.row_phase`.
+
+    u (N,) float64 is scratch. (Three short loops, for LLVM proves of each that its arrays do not overlap.)
+    """
+    count = np.uint64(out.shape[0])
     if m.table.shape[0] > 0:
-        for i in range(np.uint64(out.shape[0])):
+        for i in range(count):
             out[i] = np.float32(offsets[np.uint64(kind[i])])
         return
     br = m.b * row
-    for i in range(np.uint64(out.shape[0])):
-        column = x[i] + shift
-        column = width - 1 - column if flip else column
-        t = (m.a * column + br) + constants[np.uint64(kind[i])]
-        phi = t - np.floor(t)
-        phi = 1.0 - phi if m.reverse else phi
-        phi = phi if phi < 1.0 else 0.0
-        if m.continuous:
-            u = phi * views - 0.5
-            k = min(max(np.floor(u), 0.0), max(last - 1.0, 0.0))
-            low = offsets[np.uint64(np.int64(k))]
-            high = offsets[np.uint64(np.int64(min(k + 1.0, last * 1.0)))]
-            out[i] = np.float32(low + (u - k) * (high - low))
-        else:
-            out[i] = np.float32(offsets[np.uint64(np.int64(min(np.floor(phi * views), views - 1.0)))])
+    turn, sign = (width - 1 - shift, -1) if flip else (shift, 1)
+    if constants.shape[0] == 3:
+        red, green, blue = constants[0], constants[1], constants[2]
+        for i in range(count):
+            constant = red if kind[i] == 0 else (green if kind[i] == 1 else blue)
+            u[i] = (m.a * np.float64(turn + sign * x[i]) + br) + constant
+    else:
+        for i in range(count):
+            u[i] = (m.a * np.float64(turn + sign * x[i]) + br) + constants[np.uint64(kind[i])]
+    views, reverse, last = np.float64(m.views), m.reverse, offsets.shape[0] - 1
+    for i in range(count):
+        phi = u[i] - np.floor(u[i])
+        phi = 1.0 - phi if reverse else phi
+        u[i] = (phi if phi < 1.0 else 0.0) * views
+    if m.continuous:
+        top = np.float64(max(last - 1, 0))
+        following = np.int64(min(last, 1))
+        for i in range(count):
+            at = u[i] - 0.5
+            k = min(max(np.floor(at), 0.0), top)
+            j = np.uint64(np.int64(k))
+            low, high = offsets[j], offsets[np.uint64(np.int64(k) + following)]
+            out[i] = np.float32(low + (at - k) * (high - low))
+    else:
+        for i in range(count):
+            out[i] = np.float32(offsets[np.uint64(np.int64(min(np.floor(u[i]), views - 1.0)))])
