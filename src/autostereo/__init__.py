@@ -29,25 +29,30 @@ _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = [*_MODULE_OF, "__version__"]
 
-if TYPE_CHECKING:
-    from .display.display import Display
-    from .display.rig import Rig
-    from .engines.options import Options
-    from .errors import (
-        AutostereoError,
-        DependencyError,
-        FileError,
-        InputError,
-        MemoryLimitError,
-        UnsupportedError,
-    )
-    from .frame import Panel, ViewStack
-    from .io import load
-    from .render import Renderer, interlace, observe, render, render_views
-    from .scene.appearance import DirectionalLight, Material, PointLight
-    from .scene.mesh import Mesh
-    from .scene.scene import Scene
-    from .viewmap import ViewMap
+if TYPE_CHECKING:  # "as" tells type checkers that a name is public
+    from .display.display import Display as Display
+    from .display.rig import Rig as Rig
+    from .engines.options import Options as Options
+    from .errors import AutostereoError as AutostereoError
+    from .errors import DependencyError as DependencyError
+    from .errors import FileError as FileError
+    from .errors import InputError as InputError
+    from .errors import MemoryLimitError as MemoryLimitError
+    from .errors import UnsupportedError as UnsupportedError
+    from .frame import Panel as Panel
+    from .frame import ViewStack as ViewStack
+    from .io import load as load
+    from .render import Renderer as Renderer
+    from .render import interlace as interlace
+    from .render import observe as observe
+    from .render import render as render
+    from .render import render_views as render_views
+    from .scene.appearance import DirectionalLight as DirectionalLight
+    from .scene.appearance import Material as Material
+    from .scene.appearance import PointLight as PointLight
+    from .scene.mesh import Mesh as Mesh
+    from .scene.scene import Scene as Scene
+    from .viewmap import ViewMap as ViewMap
 
 
 def __getattr__(name: str) -> Any:

@@ -6,7 +6,7 @@ import os
 import secrets
 from collections.abc import Callable
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,9 +56,8 @@ def write_image(path: str | os.PathLike[str], pixels: NDArray[np.uint8]) -> Path
     if pixels.dtype != np.uint8 or pixels.ndim != 3 or pixels.shape[2] not in (3, 4):
         raise InputError(f"pixels: expected (H, W, 3 or 4) uint8, got {pixels.shape} {pixels.dtype}")
     image = Image.fromarray(pixels)
-    options: dict[str, object] = {".png": {"compress_level": 1}, ".webp": {"lossless": True, "method": 0}}.get(
-        path.suffix.lower(), {"quality": 95}
-    )
+    of_kind: dict[str, dict[str, Any]] = {".png": {"compress_level": 1}, ".webp": {"lossless": True, "method": 0}}
+    options = of_kind.get(path.suffix.lower(), {"quality": 95})
     if path.suffix.lower() in (".jpg", ".jpeg"):
         image = image.convert("RGB")
         options["subsampling"] = 0  # chroma subsampling would mix neighbouring views

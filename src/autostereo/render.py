@@ -110,7 +110,7 @@ class Renderer:
         self, rig: Rig, size: tuple[int, int] = (512, 512), *, method: str = "single-pass",
         options: Options | None = None, out: NDArray[np.uint8] | None = None,
     ) -> ViewStack:
-        """Render a stack of views; `out` (V, H, W, 4) uint8 may be given to hold it. See the function `render_views`."""
+        """Render a stack of views; `out` (V, H, W, 4) uint8 may be given to hold it. See `render_views`."""
         options = options or Options()
         schedule = methods.get_method(method, self.engine)
         camera = make_camera(rig, size)
@@ -138,7 +138,8 @@ class Renderer:
     def _array(self, name: str, out: Any, shape: tuple[int, ...], dtype: type) -> NDArray[Any]:
         """The array to draw into: the caller's, or one kept from frame to frame."""
         if out is not None:
-            if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != dtype or not out.flags.c_contiguous:
+            fits = isinstance(out, np.ndarray) and out.shape == shape and out.dtype == dtype
+            if not fits or not out.flags.c_contiguous:
                 raise InputError(f"out: expected a contiguous {np.dtype(dtype)} array of shape {shape}")
             return out
         held = self._held.get(name)

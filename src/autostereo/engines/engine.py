@@ -6,7 +6,7 @@ An engine knows arrays, camera offsets, a view map and a target. It knows neithe
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -61,7 +61,7 @@ class Draw:
     viewmap: ViewMap | None = None
     flip_x: bool = False
     flip_y: bool = False
-    options: Options = Options()
+    options: Options = field(default_factory=Options)
 
 
 @dataclass(eq=False)
@@ -86,7 +86,10 @@ class Engine(Protocol):
     """A way to draw. `prepare` once per scene, `draw` once per frame and pass."""
 
     name: str
-    methods: tuple[str, ...]
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Names of the methods it can be driven by."""
 
     def prepare(self, scene: Scene) -> Any:
         """Turn a scene into what this engine draws fastest."""

@@ -199,7 +199,7 @@ def _merge_rows(picture, index, m, flips, rows, out):
 def merge_view(
     picture: NDArray[np.uint8], index: int, viewmap: ViewMap, flips: tuple[bool, bool], out: NDArray[np.uint8]
 ) -> None:
-    """Write those sub-pixels of the panel that show view `index`, from that view's picture (H, W, 4); see `interlace`."""
+    """Write those sub-pixels of the panel that show view `index`, from its picture (H, W, 4); see `interlace`."""
     m = map_args(viewmap)
     run_rows(out.shape[0], lambda start, stop: _merge_rows(picture, index, m, flips, (start, stop), out))
 

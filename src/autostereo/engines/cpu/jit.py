@@ -19,7 +19,7 @@ from numba import config, njit
 
 
 def _key() -> str:
-    """Digest of every kernel source of this engine, where it lies (Numba's cache asks), Numba's version and Python's."""
+    """Digest of this engine's sources, where they lie (Numba's cache asks), Numba's version and Python's."""
     digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:3]} {Path(__file__).parent}".encode())
     for source in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(source.read_bytes())
