@@ -17,6 +17,7 @@ from . import gather
 from .jit import is_compiled
 from .mesh_panel import PanelNumbers, draw_panel
 from .mesh_raster import Scratch, Shader, Surface
+from .mesh_reuse import exact_offsets
 from .mesh_setup import (
     CameraNumbers, clip_near, count_crossing, cull_and_count, fill_bins, light_vertices, project_vertices, turn_normals,
 )
@@ -31,6 +32,7 @@ __all__ = ["CpuEngine", "is_compiled"]
 BAND_BYTES = 160_000  # of samples: with what else a band touches it stays in L2
 PANEL_ROWS = 4  # rows of a panel per bin
 VERTEX_CHUNK = 8192
+_counting = threading.Lock()
 
 
 @dataclass(eq=False)
@@ -115,7 +117,8 @@ class CpuEngine:
         surface, camera, shader = surface_at(prepared, draw, (rows_per_band, block, blocks))
         samples = rows_per_band * views * block
         sums = 4 * samples if side > 1 else 0
-        pool = prepared.pool(("views", samples, sums), lambda: new_scratch(samples, sums))
+        exact = (len(shader.exact), width)
+        pool = prepared.pool(("views", samples, sums, exact), lambda: new_scratch(samples, sums, exact))
         offsets = draw.offsets.astype(np.float32)
         background = background_word(prepared.scene)
         out = target.color.view(np.int32).reshape(views, height, width)
@@ -125,6 +128,7 @@ class CpuEngine:
             with pool as scratch:
                 bins = (first, end, rows_per_band, blocks, block)
                 draw_views(bins, surface, camera, shader, offsets, background, side, scratch, out, depth)
+                count_samples(target, scratch)
 
         run_rows(-(-height // rows_per_band) * blocks, task)
 
@@ -138,7 +142,10 @@ class CpuEngine:
         plans = prepared.plans(draw)
         total = plans.x.shape[1]
         sums = 3 * width if side > 1 else 0
-        pool = prepared.pool(("panel", total, sums), lambda: (new_row(total), new_scratch(total, sums)))
+        exact = (len(shader.exact), width)
+        pool = prepared.pool(
+            ("panel", total, sums, exact), lambda: (new_row(total), new_scratch(total, sums, exact))
+        )
         background = background_word(prepared.scene)
         empty_row = np.tile(np.array([background]).view(np.uint8)[:3], width)
 
@@ -149,6 +156,7 @@ class CpuEngine:
                     bands, surface, camera, shader, panel, plans, background, empty_row, side, row_memory, scratch,
                     target.color,
                 )
+                count_samples(target, scratch)
 
         run_rows(-(-height // PANEL_ROWS), task)
 
@@ -171,13 +179,22 @@ class Pool:
         self._free.put(self._local.item)
 
 
-def new_scratch(samples: int, sums: int) -> Scratch:
-    """One thread's memory for a band of `samples`, with `sums` accumulators for sub-samples."""
+def new_scratch(samples: int, sums: int, exact: tuple[int, int]) -> Scratch:
+    """One thread's memory: a band of `samples`, accumulators for sub-samples, colours of `exact` views × width."""
     words = np.zeros(STRIDE, np.int64)
     return Scratch(
         np.zeros(samples, np.int64), np.zeros(32, np.float32), np.zeros(FLOAT_ROWS * STRIDE, np.float32),
         np.zeros(INT_ROWS * STRIDE, np.int32), words, words.view(np.int32), np.zeros(sums, np.uint16),
+        np.zeros(exact[0] * exact[1], np.int32), np.zeros((3, exact[0]), np.int32), np.zeros(2, np.int64),
     )
+
+
+def count_samples(target: Target, scratch: Scratch) -> None:
+    """Move a thread's counters to the target's."""
+    with _counting:
+        target.covered += int(scratch.counts[0])
+        target.reused += int(scratch.counts[1])
+    scratch.counts[:] = 0
 
 
 def new_row(total: int) -> tuple[NDArray[Any], ...]:
@@ -233,8 +250,10 @@ def surface_at(prepared: Prepared, draw: Draw, bins: tuple[int, int, int]) -> tu
     )
     own_eye = np.float32(options.shading != "center")
     points = bool(lights[:, 0].any())
+    exact = exact_offsets(draw.offsets) if options.shading == "reuse" else np.empty(0, np.float32)
     shader = Shader(
-        lights, arrays.texels, arrays.texture_levels, arrays.level_count, per_sample, own_eye, points
+        lights, arrays.texels, arrays.texture_levels, arrays.level_count, per_sample, own_eye, points, exact,
+        np.float32(camera.fx / camera.focal),
     )
     return surface, numbers, shader
 

@@ -11,13 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_raster import cut_triangle, fill_segment, fill_uv, row_geometry, rows_of, shade, uv_gradient
+from .mesh_raster import cut_triangle, fill_segment, fill_uv, row_geometry, rows_of, uv_gradient
+from .mesh_reuse import finish_list, shade_exact
 from .mesh_shade import (
     ADDRESS, BASE, CAPACITY, END, LANE_OFFSET, LANE_U, LANE_X, LANE_Z, OFFSET, ONE, PLACE, RUN, START, U, X, Z, ZERO,
 )
 from .mesh_views import NO_GRADIENT
 from .panel_plan import PAD, row_offsets
-from .samples import COLOR_MASK, clear_samples, hit, nearer, plain_color, scatter, word
+from .samples import COLOR_MASK, clear_samples, hit, nearer, plain_color, word
 
 STRETCH = np.uint64(512)  # samples handled at once
 SLACK = np.float32(4e-3)
@@ -163,13 +164,14 @@ def list_visible_lanes(groups, n, at, ends, depths, lists, ints, band):
 
 @inlined
 def draw_segment(width, shift, margin, ends, depths, plain, shader, shading, first, bounds, at, x, offset, band, segment,
-                 lists, ints, words, halves):
+                 lists, ints, words, halves, colors, spans, counts):
     """Draw one segment in every sub-pixel; shading = (material, side, row, gradient).
 
     Short stretches are drawn across the groups, the first sample of each, the second, …; long ones group by group.
     """
-    material, side, geometry, gradient = shading
     color = (segment[0], segment[1], segment[2], segment[16], segment[17], segment[18])
+    if shader.exact.shape[0] > 0 and not plain:
+        shade_exact(ends, depths, at, np.float32(width), shader, shading, segment, lists, ints, colors, spans)
     n = np.uint64(0)
     groups = np.uint64(bounds.shape[1] - 1)
     # rounding moves an end by less than SLACK; samples at sub-pixels lie anywhere in their pixel
@@ -195,13 +197,11 @@ def draw_segment(width, shift, margin, ends, depths, plain, shader, shading, fir
                 test_stretch(count, k, at, ends, depths, x, offset, lists)
                 n = list_visible(count, k, n, at, x, offset, lists, ints, band)
                 if n > np.uint64(CAPACITY) - STRETCH:
-                    shade(n, shader, material, side, geometry, gradient, segment, lists, ints)
-                    scatter(n, band, ints)
+                    finish_list(n, at, shader, shading, segment, lists, ints, colors, spans, counts, band)
                     n = np.uint64(0)
             k += count
     if n > np.uint64(0):
-        shade(n, shader, material, side, geometry, gradient, segment, lists, ints)
-        scatter(n, band, ints)
+        finish_list(n, at, shader, shading, segment, lists, ints, colors, spans, counts, band)
 
 
 @inlined
@@ -213,6 +213,7 @@ def draw_row(r, bin_index, surface, camera, shader, sample_y, at, shift, margin,
     )
     band, segment, lists, ints = scratch.band, scratch.segment, scratch.lists, scratch.ints
     words, halves = scratch.words, scratch.halves
+    colors, spans, counts = scratch.colors, scratch.spans, scratch.counts
     width, y = int(camera.width), r + sample_y
     for entry in range(surface.bin_start[bin_index], surface.bin_start[bin_index + 1]):
         index = np.uint64(bins[entry])
@@ -237,7 +238,7 @@ def draw_row(r, bin_index, surface, camera, shader, sample_y, at, shift, margin,
             shading = (material, side, row_geometry(y, camera), gradient)
             draw_segment(
                 width, shift, margin, ends, depths, plain, shader, shading, first, bounds, at, x, offset, band, segment,
-                lists, ints, words, halves,
+                lists, ints, words, halves, colors, spans, counts,
             )
 
 

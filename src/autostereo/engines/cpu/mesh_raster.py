@@ -46,7 +46,8 @@ class Surface(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """One thread's own memory: band of samples, segment ends, lists (mesh_shade), words of lanes, sums of sub-samples."""
+    """One thread's own memory: band of samples, segment ends, lists (mesh_shade), words of lanes, and as halves,
+    sums of sub-samples; colours and spans of exact views, numbers of listed and reused samples (mesh_reuse)."""
 
     band: np.ndarray
     segment: np.ndarray
@@ -55,13 +56,17 @@ class Scratch(NamedTuple):
     words: np.ndarray
     halves: np.ndarray
     sums: np.ndarray
+    colors: np.ndarray
+    spans: np.ndarray
+    counts: np.ndarray
 
 
 class Shader(NamedTuple):
     """What `shade` reads besides the segment. (Arrays are taken out of tuples once per band: each time counts a
     reference, atomically.)
 
-    lights (L, 8) float32; textures = (texels, texture_levels, level_count); per_sample; own_eye; point_lights: any.
+    lights (L, 8) float32 (scene_arrays.light_array); texels, texture_levels, level_count as in SceneArrays; own_eye 1 or 0;
+    point_lights: any; exact (E,) float32: offsets of exact views, none without reuse; slide: fx/focal.
     """
 
     lights: np.ndarray
@@ -71,6 +76,8 @@ class Shader(NamedTuple):
     per_sample: bool
     own_eye: np.float32
     point_lights: bool
+    exact: np.ndarray
+    slide: np.float32
 
 
 @inlined

@@ -11,11 +11,12 @@ from __future__ import annotations
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_raster import cut_triangle, fill_segment, fill_uv, row_geometry, rows_of, shade, uv_gradient
+from .mesh_raster import cut_triangle, fill_segment, fill_uv, row_geometry, rows_of, uv_gradient
+from .mesh_reuse import finish_list, shade_exact
 from .mesh_shade import (
     ADDRESS, BASE, CAPACITY, LANE_U, LANE_Z, OFFSET, RUN, START, U, X, Z, ZERO,
 )
-from .samples import COLOR_MASK, DEPTH_SHIFT, clear_samples, hit, nearer, plain_color, scatter, word
+from .samples import COLOR_MASK, DEPTH_SHIFT, clear_samples, hit, nearer, plain_color, word
 
 NO_GRADIENT = (ZERO,) * 11
 VIEWS_AT_ONCE = 512  # leaves the lists room for the samples of two steps
@@ -94,11 +95,13 @@ def test_lanes(views, first_view, k, sample_x, ends, depths, offsets, lists):
 
 
 @inlined
-def draw_segment(block, ends, depths, plain, shader, shading, offsets, band, segment, lists, ints, words, halves):
+def draw_segment(block, ends, depths, plain, shader, shading, offsets, band, segment, lists, ints, words, halves,
+                 colors, spans, counts, width):
     """Draw one segment in every view; shading = (material, side, row, gradient)."""
     low, high, sample_x, row, stride = block
-    material, side, geometry, gradient = shading
     color = (segment[0], segment[1], segment[2], segment[16], segment[17], segment[18])
+    if shader.exact.shape[0] > 0 and not plain:
+        shade_exact(ends, depths, sample_x, width, shader, shading, segment, lists, ints, colors, spans)
     n = np.uint64(0)
     for first in range(0, offsets.shape[0], VIEWS_AT_ONCE):
         first_view = np.uint64(first)
@@ -113,12 +116,10 @@ def draw_segment(block, ends, depths, plain, shader, shading, offsets, band, seg
             test_lanes(views, first_view, k, sample_x, ends, depths, offsets, lists)
             n = list_visible(views, first_view, k, n, np.float32(k) + sample_x, offsets, lists, ints, band)
             if n > np.uint64(CAPACITY) - views:
-                shade(n, shader, material, side, geometry, gradient, segment, lists, ints)
-                scatter(n, band, ints)
+                finish_list(n, sample_x, shader, shading, segment, lists, ints, colors, spans, counts, band)
                 n = np.uint64(0)
     if n > np.uint64(0):
-        shade(n, shader, material, side, geometry, gradient, segment, lists, ints)
-        scatter(n, band, ints)
+        finish_list(n, sample_x, shader, shading, segment, lists, ints, colors, spans, counts, band)
 
 
 @inlined
@@ -129,7 +130,7 @@ def draw_block(rows, columns, bin_index, surface, camera, shader, offsets, sampl
         surface.triangles, surface.bins, surface.face_material, surface.materials,
     )
     band, segment, lists, ints, words = scratch.band, scratch.segment, scratch.lists, scratch.ints, scratch.words
-    halves = scratch.halves
+    halves, colors, spans, counts = scratch.halves, scratch.colors, scratch.spans, scratch.counts
     sample_x, sample_y = np.float32(sample[0]), sample[1]
     stride = np.int32(columns[1] - columns[0])
     row_words = offsets.shape[0] * (columns[1] - columns[0])
@@ -158,7 +159,10 @@ def draw_block(rows, columns, bin_index, surface, camera, shader, offsets, sampl
                 if textured:
                     fill_uv(uv, corners, left, right, segment)
                 shading = (material, side, row_geometry(y, camera), gradient)
-                draw_segment(block, ends, depths, plain, shader, shading, offsets, band, segment, lists, ints, words, halves)
+                draw_segment(
+                    block, ends, depths, plain, shader, shading, offsets, band, segment, lists, ints, words, halves,
+                    colors, spans, counts, np.float32(camera.width),
+                )
 
 
 @inlined
