@@ -12,14 +12,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scene.scene import Scene
-from ..engine import Camera, Draw, Target
+from ..engine import Draw, Target
 from . import gather
 from .jit import is_compiled
 from .mesh_panel import PanelNumbers, draw_panel
 from .mesh_raster import Scratch, Shader, Surface
 from .mesh_reuse import exact_offsets
 from .mesh_setup import (
-    CameraNumbers, clip_near, count_crossing, cull_and_count, fill_bins, light_vertices, project_vertices, turn_normals,
+    CameraNumbers,
+    clip_near,
+    count_crossing,
+    cull_and_count,
+    fill_bins,
+    light_vertices,
+    project_vertices,
+    turn_normals,
 )
 from .mesh_shade import FLOAT_ROWS, INT_ROWS, STRIDE
 from .mesh_views import draw_views
@@ -143,9 +150,7 @@ class CpuEngine:
         total = plans.x.shape[1]
         sums = 3 * width if side > 1 else 0
         exact = (len(shader.exact), width)
-        pool = prepared.pool(
-            ("panel", total, sums, exact), lambda: (new_row(total), new_scratch(total, sums, exact))
-        )
+        pool = prepared.pool(("panel", total, sums, exact), lambda: (new_row(total), new_scratch(total, sums, exact)))
         background = background_word(prepared.scene)
         empty_row = np.tile(np.array([background]).view(np.uint8)[:3], width)
 
@@ -153,7 +158,17 @@ class CpuEngine:
             with pool as (row_memory, scratch):
                 bands = (first, end, PANEL_ROWS)
                 draw_panel(
-                    bands, surface, camera, shader, panel, plans, background, empty_row, side, row_memory, scratch,
+                    bands,
+                    surface,
+                    camera,
+                    shader,
+                    panel,
+                    plans,
+                    background,
+                    empty_row,
+                    side,
+                    row_memory,
+                    scratch,
                     target.color,
                 )
                 count_samples(target, scratch)
@@ -183,9 +198,16 @@ def new_scratch(samples: int, sums: int, exact: tuple[int, int]) -> Scratch:
     """One thread's memory: a band of `samples`, accumulators for sub-samples, colours of `exact` views × width."""
     words = np.zeros(STRIDE, np.int64)
     return Scratch(
-        np.zeros(samples, np.int64), np.zeros(32, np.float32), np.zeros(FLOAT_ROWS * STRIDE, np.float32),
-        np.zeros(INT_ROWS * STRIDE, np.int32), words, words.view(np.int32), np.zeros(sums, np.uint16),
-        np.zeros(exact[0] * exact[1], np.int32), np.zeros((3, exact[0]), np.int32), np.zeros(2, np.int64),
+        np.zeros(samples, np.int64),
+        np.zeros(32, np.float32),
+        np.zeros(FLOAT_ROWS * STRIDE, np.float32),
+        np.zeros(INT_ROWS * STRIDE, np.int32),
+        words,
+        words.view(np.int32),
+        np.zeros(sums, np.uint16),
+        np.zeros(exact[0] * exact[1], np.int32),
+        np.zeros((3, exact[0]), np.int32),
+        np.zeros(2, np.int64),
     )
 
 
@@ -200,7 +222,10 @@ def count_samples(target: Target, scratch: Scratch) -> None:
 def new_row(total: int) -> tuple[NDArray[Any], ...]:
     """One thread's memory for a panel row of `total` samples: offsets, places, scratch, finished values."""
     return (
-        np.zeros(total, np.float32), np.zeros(total, np.float32), np.zeros(total, np.float64), np.zeros(total + 3, np.uint8)
+        np.zeros(total, np.float32),
+        np.zeros(total, np.float32),
+        np.zeros(total, np.float64),
+        np.zeros(total + 3, np.uint8),
     )
 
 
@@ -252,7 +277,14 @@ def surface_at(prepared: Prepared, draw: Draw, bins: tuple[int, int, int]) -> tu
     points = bool(lights[:, 0].any())
     exact = exact_offsets(draw.offsets) if options.shading == "reuse" else np.empty(0, np.float32)
     shader = Shader(
-        lights, arrays.texels, arrays.texture_levels, arrays.level_count, per_sample, own_eye, points, exact,
+        lights,
+        arrays.texels,
+        arrays.texture_levels,
+        arrays.level_count,
+        per_sample,
+        own_eye,
+        points,
+        exact,
         np.float32(camera.fx / camera.focal),
     )
     return surface, numbers, shader
@@ -289,8 +321,16 @@ def _binned(
     def cull(first: int, last: int) -> None:
         for c in range(first, last):
             kept[c] = cull_and_count(
-                (edges[c], edges[c + 1]), faces, face_ids, vertices, prepared.arrays, camera, culling, bands,
-                triangles, counts[c],
+                (edges[c], edges[c + 1]),
+                faces,
+                face_ids,
+                vertices,
+                prepared.arrays,
+                camera,
+                culling,
+                bands,
+                triangles,
+                counts[c],
             )
 
     run_rows(chunks, cull, 1)

@@ -61,7 +61,10 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile `function` into its callers: for the small steps of an inner loop."""
+    """Compile `function` into its callers: for the small steps of an inner loop.
+
+    Without reference counting (`_nrt`): it neither makes nor keeps arrays, and atomic counts cost as much as a pixel.
+    """
     return _compile(function, forceinline=True, _nrt=False)
 
 

@@ -14,11 +14,28 @@ from .jit import inlined, kernel
 from .mesh_raster import cut_triangle, fill_segment, fill_uv, row_geometry, rows_of, uv_gradient
 from .mesh_reuse import finish_list, shade_exact
 from .mesh_shade import (
-    ADDRESS, BASE, CAPACITY, END, LANE_OFFSET, LANE_U, LANE_X, LANE_Z, OFFSET, ONE, PLACE, RUN, START, U, X, Z, ZERO,
+    ADDRESS,
+    BASE,
+    CAPACITY,
+    END,
+    LANE_OFFSET,
+    LANE_U,
+    LANE_X,
+    LANE_Z,
+    OFFSET,
+    ONE,
+    PLACE,
+    RUN,
+    START,
+    ZERO,
+    U,
+    X,
+    Z,
 )
 from .mesh_views import NO_GRADIENT
-from .panel_plan import PAD, row_offsets
-from .samples import COLOR_MASK, clear_samples, hit, nearer, plain_color, word
+from .panel_plan import PAD
+from .panel_row import add_row, collect_row, row_offsets, set_places, store_background, store_row
+from .samples import clear_samples, hit, nearer, plain_color, word
 
 STRETCH = np.uint64(512)  # samples handled at once
 SLACK = np.float32(4e-3)
@@ -163,8 +180,30 @@ def list_visible_lanes(groups, n, at, ends, depths, lists, ints, band):
 
 
 @inlined
-def draw_segment(width, shift, margin, ends, depths, plain, shader, shading, first, bounds, at, x, offset, band, segment,
-                 lists, ints, words, halves, colors, spans, counts):
+def draw_segment(
+    width,
+    shift,
+    margin,
+    ends,
+    depths,
+    plain,
+    shader,
+    shading,
+    first,
+    bounds,
+    at,
+    x,
+    offset,
+    band,
+    segment,
+    lists,
+    ints,
+    words,
+    halves,
+    colors,
+    spans,
+    counts,
+):
     """Draw one segment in every sub-pixel; shading = (material, side, row, gradient).
 
     Short stretches are drawn across the groups, the first sample of each, the second, …; long ones group by group.
@@ -209,7 +248,10 @@ def draw_row(r, bin_index, surface, camera, shader, sample_y, at, shift, margin,
     """Draw row r of the picture into its samples."""
     vertices, attributes, uv, wanted = surface.vertices, surface.attributes, surface.uv, surface.columns
     triangles, bins, face_material, materials = (
-        surface.triangles, surface.bins, surface.face_material, surface.materials,
+        surface.triangles,
+        surface.bins,
+        surface.face_material,
+        surface.materials,
     )
     band, segment, lists, ints = scratch.band, scratch.segment, scratch.lists, scratch.ints
     words, halves = scratch.words, scratch.halves
@@ -237,52 +279,29 @@ def draw_row(r, bin_index, surface, camera, shader, sample_y, at, shift, margin,
                 fill_uv(uv, corners, left, right, segment)
             shading = (material, side, row_geometry(y, camera), gradient)
             draw_segment(
-                width, shift, margin, ends, depths, plain, shader, shading, first, bounds, at, x, offset, band, segment,
-                lists, ints, words, halves, colors, spans, counts,
+                width,
+                shift,
+                margin,
+                ends,
+                depths,
+                plain,
+                shader,
+                shading,
+                first,
+                bounds,
+                at,
+                x,
+                offset,
+                band,
+                segment,
+                lists,
+                ints,
+                words,
+                halves,
+                colors,
+                spans,
+                counts,
             )
-
-
-@inlined
-def set_places(shift, subpixel, part_x, x, slot, places):
-    """Place of each sample of a plan, less the sample's place within its pixel if that is the same for all."""
-    count = np.uint64(places.shape[0])
-    move = np.int32(shift)
-    for i in range(count):
-        places[i] = np.float32(x[i] + move)
-    if subpixel:
-        for i in range(count):
-            places[i] += np.float32(((slot[i] & 3) + part_x) / 3.0)
-
-
-@inlined
-def collect_row(count, slot, band, line):
-    """Bring the row's values (each the channel of its own) into order: line[place] of every sample."""
-    for i in range(np.uint64(count)):
-        s = slot[i]
-        line[np.uint64(s >> 2)] = np.uint8((band[i] >> np.int64(8 * (s & 3))) & np.int64(255))
-
-
-@inlined
-def store_row(line, begin, flip, row, height_width, out):
-    """Copy the row's values, from line[begin] on, to a row of the panel, which is `out`, (H·W·3,) uint8."""
-    width = height_width[1]
-    target, source = np.uint64(row * width * 3), np.uint64(begin)
-    if not flip:
-        for i in range(np.uint64(3 * width)):
-            out[target + i] = line[source + i]
-        return
-    for x in range(width):
-        for c in range(3):
-            out[target + np.uint64(3 * (width - 1 - x) + c)] = line[source + np.uint64(3 * x + c)]
-
-
-@inlined
-def store_background(row, empty, out):
-    """Copy an empty row (3·W,) to where there is nothing to draw."""
-    count = np.uint64(empty.shape[0])
-    first = np.uint64(row) * count
-    for i in range(count):
-        out[first + i] = empty[i]
 
 
 @kernel
@@ -313,21 +332,22 @@ def draw_panel(bands, surface, camera, shader, panel, plans, background, empty_r
                 clear_samples(count + PAD, background, scratch.band)
                 at = ZERO if panel.subpixel else np.float32(part_x)
                 draw_row(
-                    r, band, surface, camera, shader, part_y, at, shift, plans.margin, first, plans.bounds, places, offset,
+                    r,
+                    band,
+                    surface,
+                    camera,
+                    shader,
+                    part_y,
+                    at,
+                    shift,
+                    plans.margin,
+                    first,
+                    plans.bounds,
+                    places,
+                    offset,
                     scratch,
                 )
                 collect_row(count, slot, scratch.band, line)
                 if samples > 1:
                     add_row(line, begin, width, s, samples, scratch.sums, line)
             store_row(line, begin, panel.flip_x, row, (height, width), flat)
-
-
-@inlined
-def add_row(line, begin, width, s, samples, sums, out):
-    """Add a row of sub-samples to the sums; with the last one, put the rounded means into `out`."""
-    for k in range(3 * width):
-        i = np.uint64(begin + k)
-        total = np.uint16(line[i]) if s == 0 else sums[np.uint64(k)] + np.uint16(line[i])
-        sums[np.uint64(k)] = total
-        if s == samples - 1:
-            out[i] = np.uint8((np.int64(total) + samples // 2) // samples)

@@ -16,8 +16,26 @@ import numpy as np
 
 from .jit import inlined, kernel
 from .mesh_shade import (
-    DB, DG, DR, KB, KG, KR, NX, NY, NZ, ONE, SB, SG, SR, TS, TT, ZERO,
-    add_light, clear_sums, interpolate, locate, modulate, normalize_normals, pack,
+    KB,
+    KG,
+    KR,
+    NX,
+    NY,
+    NZ,
+    ONE,
+    SB,
+    SG,
+    SR,
+    TS,
+    TT,
+    ZERO,
+    add_light,
+    clear_sums,
+    interpolate,
+    locate,
+    modulate,
+    normalize_normals,
+    pack,
 )
 from .mesh_texture import level_of_detail, modulate_by_texture
 
@@ -65,8 +83,8 @@ class Shader(NamedTuple):
     """What `shade` reads besides the segment. (Arrays are taken out of tuples once per band: each time counts a
     reference, atomically.)
 
-    lights (L, 8) float32 (scene_arrays.light_array); texels, texture_levels, level_count as in SceneArrays; own_eye 1 or 0;
-    point_lights: any; exact (E,) float32: offsets of exact views, none without reuse; slide: fx/focal.
+    lights (L, 8) float32 (scene_arrays.light_array); texels, texture_levels, level_count as in SceneArrays; own_eye
+    1 or 0; point_lights: any; exact (E,) float32: offsets of exact views, none without reuse; slide: fx/focal.
     """
 
     lights: np.ndarray
@@ -82,7 +100,7 @@ class Shader(NamedTuple):
 
 @inlined
 def cut_edge(vertices, top, bottom, y, camera):
-    """Where row y crosses an edge: x at the centre camera, focal/depth, shift per unit of offset, perspective parameter.
+    """Where row y crosses an edge: x at the centre, focal/depth, shift per unit of offset, perspective parameter.
 
     Always from the upper to the lower vertex, so that triangles sharing the edge get the same bits.
     """
@@ -151,10 +169,17 @@ def uv_gradient(v, uv, corners, camera):
     sb, tb = (uv[b, 0] - s0) * v[b, 2] - sa, (uv[b, 1] - t0) * v[b, 2] - ta
     sc, tc = (uv[c, 0] - s0) * v[c, 2] - sa, (uv[c, 1] - t0) * v[c, 2] - ta
     return (
-        np.float32(zb * yc - zc * yb), np.float32(sb * yc - sc * yb), np.float32(tb * yc - tc * yb),
-        np.float32(zc * xb - zb * xc), np.float32(sc * xb - sb * xc), np.float32(tc * xb - tb * xc),
-        np.float32(zc * pb - zb * pc), np.float32(sc * pb - sb * pc), np.float32(tc * pb - tb * pc),
-        np.float32(xb * yc - xc * yb), np.float32(pb * yc - pc * yb),
+        np.float32(zb * yc - zc * yb),
+        np.float32(sb * yc - sc * yb),
+        np.float32(tb * yc - tc * yb),
+        np.float32(zc * xb - zb * xc),
+        np.float32(sc * xb - sb * xc),
+        np.float32(tc * xb - tb * xc),
+        np.float32(zc * pb - zb * pc),
+        np.float32(sc * pb - sb * pc),
+        np.float32(tc * pb - tb * pc),
+        np.float32(xb * yc - xc * yb),
+        np.float32(pb * yc - pc * yb),
     )
 
 

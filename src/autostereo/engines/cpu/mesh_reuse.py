@@ -2,8 +2,8 @@
 
 The cameras are divided into sets of neighbours. Of each set one view is exact: it shades its samples of a segment, all
 of them, and remembers the colours. A sample of another view is looked up at its place in the exact view of its set:
-between two remembered colours it is interpolated, beside one it takes that one, and where there is none (the triangle is
-not seen there) it is shaded afresh. Coverage and depth stay exact everywhere.
+between two remembered colours it is interpolated, beside one it takes that one, and where there is none (the triangle
+is not seen there) it is shaded afresh. Coverage and depth stay exact everywhere.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 
 from .jit import inlined, kernel
 from .mesh_raster import shade
-from .mesh_shade import ADDRESS, CAPACITY, COLOR, OFFSET, ONE, U, X, Z, ZERO
+from .mesh_shade import ADDRESS, CAPACITY, COLOR, OFFSET, ONE, ZERO, U, X, Z
 from .samples import COLOR_MASK, hit, scatter
 
 VIEWS_PER_SET = 8

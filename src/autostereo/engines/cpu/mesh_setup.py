@@ -47,7 +47,8 @@ def project_vertices(first, last, positions, eye_from_world, camera, vertices):
         inverse = 1.0 / depth
         vertices[i, 0] = 0.5 * camera.width + camera.fx * x * inverse
         vertices[i, 1] = (
-            0.5 * camera.height - camera.fy * (y - camera.offset_y) * inverse
+            0.5 * camera.height
+            - camera.fy * (y - camera.offset_y) * inverse
             - camera.fy * camera.offset_y / camera.focal
         )
         vertices[i, 2] = camera.focal * inverse
@@ -154,7 +155,8 @@ def clip_near(faces, face_ids, positions, eye_from_world, camera, vertices, attr
                 x, y = ax + t * (bx - ax), ay + t * (by - ay)
                 vertices[new, 0] = 0.5 * camera.width + camera.fx * x * inverse
                 vertices[new, 1] = (
-                    0.5 * camera.height - camera.fy * (y - camera.offset_y) * inverse
+                    0.5 * camera.height
+                    - camera.fy * (y - camera.offset_y) * inverse
                     - camera.fy * camera.offset_y / camera.focal
                 )
                 vertices[new, 2] = camera.focal * inverse

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_shade import HALF, KB, KG, KR, LOD, OFFSET, ONE, TINY, TS, TT, Z, ZERO, log2_fast
+from .mesh_shade import HALF, KB, KG, KR, LOD, OFFSET, ONE, TINY, TS, TT, ZERO, Z, log2_fast
 
 BYTE_SCALE = np.float32(1.0 / 255.0)
 
@@ -47,12 +47,16 @@ def bilinear(texels, first, width, height, s, t):
     e, f = np.uint32(8), np.uint32(16)
     red = wa * np.float32(a & m) + wb * np.float32(b & m) + wc * np.float32(c & m) + wd * np.float32(d & m)
     green = (
-        wa * np.float32(a >> e & m) + wb * np.float32(b >> e & m)
-        + wc * np.float32(c >> e & m) + wd * np.float32(d >> e & m)
+        wa * np.float32(a >> e & m)
+        + wb * np.float32(b >> e & m)
+        + wc * np.float32(c >> e & m)
+        + wd * np.float32(d >> e & m)
     )
     blue = (
-        wa * np.float32(a >> f & m) + wb * np.float32(b >> f & m)
-        + wc * np.float32(c >> f & m) + wd * np.float32(d >> f & m)
+        wa * np.float32(a >> f & m)
+        + wb * np.float32(b >> f & m)
+        + wc * np.float32(c >> f & m)
+        + wd * np.float32(d >> f & m)
     )
     return red * BYTE_SCALE, green * BYTE_SCALE, blue * BYTE_SCALE
 

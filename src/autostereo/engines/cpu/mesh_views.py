@@ -14,7 +14,18 @@ from .jit import inlined, kernel
 from .mesh_raster import cut_triangle, fill_segment, fill_uv, row_geometry, rows_of, uv_gradient
 from .mesh_reuse import finish_list, shade_exact
 from .mesh_shade import (
-    ADDRESS, BASE, CAPACITY, LANE_U, LANE_Z, OFFSET, RUN, START, U, X, Z, ZERO,
+    ADDRESS,
+    BASE,
+    CAPACITY,
+    LANE_U,
+    LANE_Z,
+    OFFSET,
+    RUN,
+    START,
+    ZERO,
+    U,
+    X,
+    Z,
 )
 from .samples import COLOR_MASK, DEPTH_SHIFT, clear_samples, hit, nearer, plain_color, word
 
@@ -95,8 +106,25 @@ def test_lanes(views, first_view, k, sample_x, ends, depths, offsets, lists):
 
 
 @inlined
-def draw_segment(block, ends, depths, plain, shader, shading, offsets, band, segment, lists, ints, words, halves,
-                 colors, spans, counts, width):
+def draw_segment(
+    block,
+    ends,
+    depths,
+    plain,
+    shader,
+    shading,
+    offsets,
+    band,
+    segment,
+    lists,
+    ints,
+    words,
+    halves,
+    colors,
+    spans,
+    counts,
+    width,
+):
     """Draw one segment in every view; shading = (material, side, row, gradient)."""
     low, high, sample_x, row, stride = block
     color = (segment[0], segment[1], segment[2], segment[16], segment[17], segment[18])
@@ -127,7 +155,10 @@ def draw_block(rows, columns, bin_index, surface, camera, shader, offsets, sampl
     """Draw rows (first, end) and columns (first, end) of every view; sample = (x, y) of the sample in its pixel."""
     vertices, attributes, uv, wanted = surface.vertices, surface.attributes, surface.uv, surface.columns
     triangles, bins, face_material, materials = (
-        surface.triangles, surface.bins, surface.face_material, surface.materials,
+        surface.triangles,
+        surface.bins,
+        surface.face_material,
+        surface.materials,
     )
     band, segment, lists, ints, words = scratch.band, scratch.segment, scratch.lists, scratch.ints, scratch.words
     halves, colors, spans, counts = scratch.halves, scratch.colors, scratch.spans, scratch.counts
@@ -148,7 +179,11 @@ def draw_block(rows, columns, bin_index, surface, camera, shader, offsets, sampl
             y = r + sample_y
             left, right = cut_triangle(vertices, corners, code & 1, y, camera)
             block = (
-                np.float32(columns[0]), np.float32(columns[1]), sample_x, np.int32((r - rows[0]) * row_words), stride,
+                np.float32(columns[0]),
+                np.float32(columns[1]),
+                sample_x,
+                np.int32((r - rows[0]) * row_words),
+                stride,
             )
             for side in range(sides):
                 if side == 1:
@@ -160,8 +195,23 @@ def draw_block(rows, columns, bin_index, surface, camera, shader, offsets, sampl
                     fill_uv(uv, corners, left, right, segment)
                 shading = (material, side, row_geometry(y, camera), gradient)
                 draw_segment(
-                    block, ends, depths, plain, shader, shading, offsets, band, segment, lists, ints, words, halves,
-                    colors, spans, counts, np.float32(camera.width),
+                    block,
+                    ends,
+                    depths,
+                    plain,
+                    shader,
+                    shading,
+                    offsets,
+                    band,
+                    segment,
+                    lists,
+                    ints,
+                    words,
+                    halves,
+                    colors,
+                    spans,
+                    counts,
+                    np.float32(camera.width),
                 )
 
 

@@ -6,8 +6,8 @@ offset of every sub-pixel: tables, slanted lenses, cells and continuous phases a
 
 Sorting is dear, rows are many, and their masks are alike: row r's phases are those of another row, moved by some
 pixels. So a few plans (`classes`) are made once per panel, a little wider than it, and every row takes the one that
-fits best, moved by `shift` pixels. How the samples are sorted decides speed only: offsets are evaluated afresh, exactly,
-for every row, and bounds allow for the misfit.
+fits best, moved by `shift` pixels. How the samples are sorted decides speed only: offsets are evaluated afresh and
+exactly for every row, and bounds allow for the misfit.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ...viewmap import ViewMap, cell_index, offset_at
 from .gather import map_args
-from .jit import inlined, kernel
+from .jit import kernel
 
 PHASE_CLASSES = 4  # starting phases for which plans are made
 MARGIN = 16  # steps by which a plan can be moved
@@ -33,9 +33,10 @@ class Plans(NamedTuple):
     """Sorted samples of a few kinds of rows, N a row.
 
     x, kind, slot (C, N) int32: pixel; which constant of the map gives its phase (cell·3 + channel), or its view for
-    tables; 4 × place in the finished row + channel. first (C, W' + 1, G) and begin (C, G + 1) int32: first sample of each group at
-    or right of a pixel, and of all. bounds (2, G) float32: least and greatest offset in a group. row_class, row_shift
-    (H,) int32. constants: the map's phase constants in one line; offsets (V,) float64 of the views.
+    tables; 4 × place in the finished row + channel. first (C, W' + 1, G) and begin (C, G + 1) int32: first sample of
+    each group at or right of a pixel, and of all. bounds (2, G) float32: least and greatest offset in a group.
+    row_class, row_shift (H,) int32. constants: the map's phase constants in one line; offsets (V,) float64 of the
+    views; margin: pixels by which a plan is wider than the panel on either side.
     """
 
     x: NDArray[np.int32]
@@ -96,17 +97,23 @@ def make_plans(viewmap: ViewMap, size: tuple[int, int], flips: tuple[bool, bool]
     count = groups + 1  # the last one is that of the misfits
     total = 3 * (width + 2 * margin) + PAD
     classes = len(phases)
+    constants = map_args(viewmap).offsets.ravel()
     plans = Plans(
-        np.empty((classes, total), np.int32), np.empty((classes, total), np.int32), np.empty((classes, total), np.int32),
-        np.empty((classes, width + 2 * margin + 1, count), np.int32), np.empty((classes, count + 1), np.int32),
-        _bounds(viewmap, offsets, groups, misfit), row_class.astype(np.int32), row_shift.astype(np.int32),
-        map_args(viewmap).offsets.ravel(), np.ascontiguousarray(offsets, dtype=np.float64), margin,
+        np.empty((classes, total), np.int32),
+        np.empty((classes, total), np.int32),
+        np.empty((classes, total), np.int32),
+        np.empty((classes, width + 2 * margin + 1, count), np.int32),
+        np.empty((classes, count + 1), np.int32),
+        _bounds(viewmap, offsets, groups, misfit),
+        row_class.astype(np.int32),
+        row_shift.astype(np.int32),
+        constants,
+        np.ascontiguousarray(offsets, dtype=np.float64),
+        margin,
     )
     for k in range(classes):
-        sort_row(
-            group[k].astype(np.int32), kinds[k].astype(np.int32), margin, count, plans.x[k], plans.kind[k], plans.slot[k],
-            plans.first[k], plans.begin[k],
-        )
+        sorted_row = (plans.x[k], plans.kind[k], plans.slot[k], plans.first[k], plans.begin[k])
+        sort_row(group[k].astype(np.int32), kinds[k].astype(np.int32), margin, count, *sorted_row)
     return plans
 
 
@@ -161,43 +168,3 @@ def _bounds(viewmap: ViewMap, offsets: NDArray, groups: int, misfit: float) -> N
         bounds = offsets[views.astype(int)]
     slack = 1e-6 * np.abs(offsets).max()
     return (bounds + np.array([[-slack], [slack]])).astype(np.float32)
-
-
-@inlined
-def row_offsets(row, width, m, flip, x, kind, shift, constants, offsets, u, out):
-    """Camera offset (N,) float32 of a plan's samples in physical row `row`; the phase is that of `gather.row_phase`.
-
-    u (N,) float64 is scratch. (Three short loops, for LLVM proves of each that its arrays do not overlap.)
-    """
-    count = np.uint64(out.shape[0])
-    if m.table.shape[0] > 0:
-        for i in range(count):
-            out[i] = np.float32(offsets[np.uint64(kind[i])])
-        return
-    br = m.b * row
-    turn, sign = (width - 1 - shift, -1) if flip else (shift, 1)
-    if constants.shape[0] == 3:
-        red, green, blue = constants[0], constants[1], constants[2]
-        for i in range(count):
-            constant = red if kind[i] == 0 else (green if kind[i] == 1 else blue)
-            u[i] = (m.a * np.float64(turn + sign * x[i]) + br) + constant
-    else:
-        for i in range(count):
-            u[i] = (m.a * np.float64(turn + sign * x[i]) + br) + constants[np.uint64(kind[i])]
-    views, reverse, last = np.float64(m.views), m.reverse, offsets.shape[0] - 1
-    for i in range(count):
-        phi = u[i] - np.floor(u[i])
-        phi = 1.0 - phi if reverse else phi
-        u[i] = (phi if phi < 1.0 else 0.0) * views
-    if m.continuous:
-        top = np.float64(max(last - 1, 0))
-        following = np.int64(min(last, 1))
-        for i in range(count):
-            at = u[i] - 0.5
-            k = min(max(np.floor(at), 0.0), top)
-            j = np.uint64(np.int64(k))
-            low, high = offsets[j], offsets[np.uint64(np.int64(k) + following)]
-            out[i] = np.float32(low + (at - k) * (high - low))
-    else:
-        for i in range(count):
-            out[i] = np.float32(offsets[np.uint64(np.int64(min(np.floor(u[i]), views - 1.0)))])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,10 @@ from ..reference.texture import box_weights
 class SceneArrays(NamedTuple):
     """Meshes one behind the other.
 
-    positions (N, 3) float64, normals and colors (N, 3) float32, uv (N, 2) float64, or (0, 0) without textures, vertex_material (N,) int32,
-    faces (F, 3) int32, face_material (F,) int32, materials (M, 8) float32: ambient, diffuse, specular, shininess,
-    two-sided, texture or −1, plain (no texture, no highlight), 0; texels int32 (RGBA); texture_levels (T, L, 3) int64: first texel, width, height;
-    level_count (T,) int64.
+    positions (N, 3) float64, normals and colors (N, 3) float32, uv (N, 2) float64, or (0, 0) without textures,
+    vertex_material (N,) int32, faces (F, 3) int32, face_material (F,) int32, materials (M, 8) float32: ambient,
+    diffuse, specular, shininess, two-sided, texture or −1, plain (no texture, no highlight), 0; texels uint32 (RGBA);
+    texture_levels (T, L, 3) int64: first texel, width, height; level_count (T,) int64.
     """
 
     positions: NDArray[np.float64]
@@ -89,7 +89,12 @@ def scene_arrays(scene: Scene) -> SceneArrays:
         if mesh.texture is not None:
             texture = images.setdefault(id(mesh.texture), (len(images), mesh.texture))[0]
         materials[m, :7] = (
-            material.ambient, material.diffuse, material.specular, material.shininess, mesh.two_sided, texture,
+            material.ambient,
+            material.diffuse,
+            material.specular,
+            material.shininess,
+            mesh.two_sided,
+            texture,
             texture < 0 and material.specular == 0,
         )
         parts["p"].append(apply(mesh.transform, mesh.vertices))
@@ -102,16 +107,25 @@ def scene_arrays(scene: Scene) -> SceneArrays:
         parts["f"].append((mesh.faces[:, [0, 2, 1]] if mirrored else mesh.faces) + np.int32(first))
         parts["fm"].append(np.full(len(mesh.faces), m, np.int32))
         first += count
-    join = {name: np.concatenate(arrays) if arrays else np.zeros((0, 0)) for name, arrays in parts.items()}
+    join: dict[str, Any] = {
+        name: np.concatenate(arrays) if arrays else np.zeros((0, 0)) for name, arrays in parts.items()
+    }
     packed = _pack_textures([image for _, image in images.values()])
     return SceneArrays(
-        np.ascontiguousarray(join["p"]), np.ascontiguousarray(join["n"]), np.ascontiguousarray(join["c"]), join["t"],
-        join["vm"], np.ascontiguousarray(join["f"], dtype=np.int32), join["fm"], materials, *packed,
+        np.ascontiguousarray(join["p"]),
+        np.ascontiguousarray(join["n"]),
+        np.ascontiguousarray(join["c"]),
+        join["t"],
+        join["vm"],
+        np.ascontiguousarray(join["f"], dtype=np.int32),
+        join["fm"],
+        materials,
+        *packed,
     )
 
 
 def light_array(scene: Scene, camera: Camera) -> NDArray[np.float32]:
-    """Lights in the centre camera's eye space, (L, 8): 0 and the way to a directional light, or 1 and a position; RGB."""
+    """Lights in the centre camera's eye space, (L, 8): 0 and the way to a directional one, or 1 and a position; RGB."""
     rotation, shift = camera.eye_from_world[:3, :3], camera.eye_from_world[:3, 3]
     if scene.lights is None:
         return np.array([[0, 0, 0, -1, 1, 1, 1, 0]], dtype=np.float32)
