@@ -14,7 +14,7 @@ demo: $(VENV)/run
 	$(BIN)/autostereo demo -o demo
 
 test: lint
-	@if [ -e tests/test_nojit.py ]; then NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q tests/test_nojit.py; fi
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q tests/test_nojit.py
 	$(BIN)/python -m pytest
 
 lint: $(VENV)/dev
