@@ -64,13 +64,13 @@ def demo(
 def choose_rig(scene: Scene, display: Display) -> Rig:
     """Cameras a little above the objects, as far apart as the display's comfort and cone allow.
 
-    `Rig.frame` would show the whole floor; here it may leave the picture.
+    `Rig.frame` keeps everything in every view; here objects are larger, and the floor may leave the picture.
     """
     from ..display.framing import depth_budget
     from ..display.rig import Rig
 
-    fov_y = 25.0 if display.aspect > 1 else 38.0
-    place = {"position": (0.0, 4.0, 8.5), "target": (-0.05, 0.2, -0.3)}
+    fov_y = 26.0 if display.aspect > 1 else 43.0
+    place = {"position": (0.05, 1.3, 9.3), "target": (0.05, 0.15, -0.3)}
     rig = Rig(**place, fov_y=fov_y, baseline=1.0, views=display.views, aspect=display.aspect)  # type: ignore[arg-type]
     budget = depth_budget(replace(scene, objects=scene.objects[1:]), display, rig)
     comfortable = display.comfort / max(abs(budget.disparity_near), abs(budget.disparity_far))

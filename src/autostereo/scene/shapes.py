@@ -129,13 +129,16 @@ def checker(
 
 
 def demo_scene() -> Scene:
-    """Objects at several depths over a chequered floor: textures, vertex colours, highlights and two lights."""
+    """Objects at several depths over a chequered floor: textures, vertex colours, highlights and two lights.
+
+    All lean towards the viewer, so that cameras which look along −z, as those of `Rig.frame`, see the floor from above.
+    """
     floor = replace(
-        plane((9.0, 7.0), (9, 7)),
+        plane((6.0, 4.5), (8, 6)),
         texture=checker(8, 512, (0.82, 0.80, 0.76), (0.30, 0.34, 0.42)),
-        transform=translation(0.0, -1.05, -0.6) @ rotation((1, 0, 0), -90),
+        transform=translation(0.0, -1.05, -0.75) @ rotation((1, 0, 0), -90),
     )
-    floor = replace(floor, uv=floor.uv * np.array((1.8, 1.4)))
+    floor = replace(floor, uv=floor.uv * np.array((1.25, 0.9375)))
     rock = replace(
         displaced_sphere(5, 0.95),
         material=Material(specular=0.25, shininess=24.0),
@@ -164,7 +167,9 @@ def demo_scene() -> Scene:
     )
     sun = DirectionalLight((-0.45, -1.0, -0.75), (0.85, 0.83, 0.80))
     lamp = PointLight((-3.0, 2.5, 3.0), (0.30, 0.33, 0.40))
-    return Scene((floor, rock, knot, globe, crate, ring), (sun, lamp), background=(0.10, 0.13, 0.20))
+    lean = rotation((1, 0, 0), 17)
+    leaning = [replace(mesh, transform=lean @ mesh.transform) for mesh in (floor, rock, knot, globe, crate, ring)]
+    return Scene(leaning, (sun, lamp), background=(0.10, 0.13, 0.20))
 
 
 def _bands() -> NDArray[np.uint8]:
