@@ -168,7 +168,8 @@ def demo_scene() -> Scene:
     sun = DirectionalLight((-0.45, -1.0, -0.75), (0.85, 0.83, 0.80))
     lamp = PointLight((-3.0, 2.5, 3.0), (0.30, 0.33, 0.40))
     lean = rotation((1, 0, 0), 17)
-    leaning = [replace(mesh, transform=lean @ mesh.transform) for mesh in (floor, rock, knot, globe, crate, ring)]
+    objects = (floor, rock, knot, globe, crate, ring)
+    leaning = tuple(replace(mesh, transform=lean @ mesh.transform) for mesh in objects)
     return Scene(leaning, (sun, lamp), background=(0.10, 0.13, 0.20))
 
 
