@@ -39,7 +39,7 @@ from .samples import clear_samples, hit, nearer, plain_color, word
 
 STRETCH = np.uint64(512)  # samples handled at once
 SLACK = np.float32(4e-3)
-ACROSS = 12  # longest stretch that is drawn across groups
+ACROSS = 400  # samples, up to which a segment's short stretches are drawn together
 
 
 class PanelNumbers(NamedTuple):
@@ -97,7 +97,7 @@ def list_visible(count, k, n, at, x, offset, lists, ints, band):
 
 @inlined
 def find_stretches(ends, at, width, shift, margin, first, bounds, lists, ints):
-    """Stretch of every group that the segment may cover; returns the longest length but for the last, the misfits'."""
+    """Stretch of every group that the segment may cover; returns the number of samples in all."""
     x1, p1, x2, p2 = ends
     groups = np.uint64(bounds.shape[1])
     limit = np.float32(width)
@@ -108,34 +108,40 @@ def find_stretches(ends, at, width, shift, margin, first, bounds, lists, ints):
         right = max(x2 + low * p2, x2 + high * p2) - after
         lists[START + g] = np.ceil(min(max(left, ZERO), limit))
         lists[RUN + g] = np.ceil(min(max(right, ZERO), limit))
-    longest = np.int32(0)
+    total = np.int32(0)
     move = np.int32(margin) - np.int32(shift)
     for g in range(groups):
         k = first[np.uint64(np.int32(lists[START + g]) + move), g]
         stop = first[np.uint64(np.int32(lists[RUN + g]) + move), g]
         ints[BASE + g], ints[END + g] = k, stop
-        if g < groups - np.uint64(1):
-            longest = max(longest, stop - k)
-    return longest
+        total += max(stop - k, np.int32(0))
+    return total
 
 
 @inlined
-def take_lanes(groups, longest, nothing, x, offset, lists, ints):
-    """Bring the stretches of all groups together, the first sample of each, the second, …; returns their number.
+def take_lanes(groups, nothing, x, offset, lists, ints):
+    """Bring the stretches of all groups together, four samples at a time without a branch; returns their number.
 
-    `nothing`, a sample that nothing covers, stands in beyond a group's end. All are brought before any is used: a SIMD
-    load right after the single stores would have to wait for them.
+    It is rounded up to whole SIMD steps with `nothing`, a sample that nothing covers. All are brought before any is
+    used: a SIMD load right after the single stores would have to wait for them.
     """
     n = np.uint64(0)
-    for k in range(longest):
-        for g in range(groups):
-            j = ints[BASE + g] + np.int32(k)
-            j = j if j < ints[END + g] else nothing
-            ints[PLACE + n] = j
-            lists[LANE_X + n] = x[np.uint64(j)]
-            lists[LANE_OFFSET + n] = offset[np.uint64(j)]
-            n += np.uint64(1)
-    return n
+    for g in range(groups):
+        k, end = ints[BASE + g], ints[END + g]
+        while k < end:
+            for i in range(4):
+                m, j = n + np.uint64(i), np.uint64(k + np.int32(i))
+                ints[PLACE + m] = np.int32(j)
+                lists[LANE_X + m] = x[j]
+                lists[LANE_OFFSET + m] = offset[j]
+            n += np.uint64(min(end - k, np.int32(4)))
+            k += np.int32(4)
+    count = (n + np.uint64(15)) & ~np.uint64(15)
+    for m in range(n, count):
+        ints[PLACE + m] = nothing
+        lists[LANE_X + m] = x[np.uint64(nothing)]
+        lists[LANE_OFFSET + m] = offset[np.uint64(nothing)]
+    return count
 
 
 @inlined
@@ -206,26 +212,25 @@ def draw_segment(
 ):
     """Draw one segment in every sub-pixel; shading = (material, side, row, gradient).
 
-    Short stretches are drawn across the groups, the first sample of each, the second, …; long ones group by group.
+    Short stretches are drawn together, long ones group by group.
     """
     color = (segment[0], segment[1], segment[2], segment[16], segment[17], segment[18])
     if shader.exact.shape[0] > 0 and not plain:
         shade_exact(ends, depths, at, np.float32(width), shader, shading, segment, lists, ints, colors, spans)
     n = np.uint64(0)
-    groups = np.uint64(bounds.shape[1] - 1)
+    groups = np.uint64(bounds.shape[1])
     # rounding moves an end by less than SLACK; samples at sub-pixels lie anywhere in their pixel
     reach = (at + SLACK, at - SLACK) if at > ZERO else (ONE, ZERO)
-    longest = find_stretches(ends, reach, width, shift, margin, first, bounds, lists, ints)
-    nothing = np.int32(x.shape[0] - 1)
-    across = longest <= ACROSS and groups * np.uint64(longest) <= STRETCH
+    total = find_stretches(ends, reach, width, shift, margin, first, bounds, lists, ints)
+    across = total <= ACROSS
     if across:
-        count = take_lanes(groups, longest, nothing, x, offset, lists, ints)
+        count = take_lanes(groups, np.int32(x.shape[0] - 1), x, offset, lists, ints)
         if plain:
             make_lane_words(count, at, ends, depths, color, lists, halves)
             keep_nearer_lanes(count, ints, words, band)
         else:
             n = list_visible_lanes(count, n, at, ends, depths, lists, ints, band)
-    for g in range(groups if across else np.uint64(0), groups + np.uint64(1)):
+    for g in range(groups if across else np.uint64(0), groups):
         k, stop = np.uint64(ints[BASE + g]), np.uint64(ints[END + g])
         while k < stop:
             count = min((stop - k + np.uint64(15)) & ~np.uint64(15), STRETCH)
