@@ -295,11 +295,11 @@ def test_the_first_run_says_that_it_compiles(cli: Run, folder: Path, monkeypatch
     from autostereo.engines.cpu import jit
 
     arguments = ("render", "square.off", "-d", "lenticular-8", *SMALL)
-    monkeypatch.setattr(jit, "is_compiled", lambda: False)
-    assert cli(*arguments).err.startswith("compiling kernels (once, up to a minute)…\n")
+    monkeypatch.setattr(jit, "is_compiled", lambda *kernels: False)
+    assert cli(*arguments).err.startswith("compiling kernels (once for each kind of picture, up to a minute)…\n")
     assert cli(*arguments, "-q").err == ""
     assert "compiling" not in cli(*arguments, "--engine", "reference").err
-    monkeypatch.setattr(jit, "is_compiled", lambda: True)
+    monkeypatch.setattr(jit, "is_compiled", lambda *kernels: True)
     assert "compiling" not in cli(*arguments).err
 
 

@@ -90,6 +90,9 @@ class Renderer:
         out: NDArray[np.uint8] | None = None,
     ) -> Panel:
         """Render a panel; `out` (H, W, 3) uint8 may be given to hold it. See the function `render`."""
+        check_arguments(rig, options)
+        if not isinstance(display, Display):
+            raise InputError(f"display: expected a Display, such as Display.preset('…'), got {type(display).__name__}")
         options = options or Options()
         schedule = methods.get_method(method, self.engine)
         rig = (rig or Rig.frame(self.scene, display)).with_views(display.views)
@@ -111,6 +114,9 @@ class Renderer:
         options: Options | None = None, out: NDArray[np.uint8] | None = None,
     ) -> ViewStack:
         """Render a stack of views; `out` (V, H, W, 4) uint8 may be given to hold it. See `render_views`."""
+        check_arguments(rig, options)
+        if rig is None:
+            raise InputError("rig: expected a Rig, got None")
         options = options or Options()
         schedule = methods.get_method(method, self.engine)
         camera = make_camera(rig, size)
@@ -173,6 +179,8 @@ def interlace(views: ViewStack, display: Display) -> Panel:
 
     A continuous display's camera coordinate is rounded to the nearest view.
     """
+    if not isinstance(views, ViewStack) or not isinstance(display, Display):
+        raise InputError("interlace: expected a ViewStack and a Display")
     if display.viewmap is None:
         raise UnsupportedError(f"{display.name}: a {display.layout} picture has no mask to interlace by")
     if (views.width, views.height) != (display.width, display.height) or views.views != display.views:
@@ -209,6 +217,8 @@ def observe(
     ndarray of shape (H, W, 3), uint8
         At each pixel and channel the sub-pixel that its lens shows to the eye.
     """
+    if not isinstance(panel, Panel) or not isinstance(display, Display):
+        raise InputError("observe: expected a Panel and a Display")
     if display.viewmap is None:
         raise UnsupportedError(f"{display.name}: a {display.layout} picture is not seen through lenses")
     if panel.pixels.shape[:2] != (display.height, display.width):
@@ -222,6 +232,16 @@ def observe(
     return look(
         panel.pixels, display.viewmap, wanted, crosstalk=crosstalk, flips=(display.flip_x, display.flip_y)
     )
+
+
+def check_arguments(rig: Any, options: Any) -> None:
+    """Raise InputError unless these are a Rig of a sane number of views and Options, or None."""
+    if rig is not None and not isinstance(rig, Rig):
+        raise InputError(f"rig: expected a Rig, got {type(rig).__name__}")
+    if rig is not None and rig.views > MAX_VIEWS:
+        raise InputError(f"rig views: expected at most {MAX_VIEWS}, got {rig.views}")
+    if options is not None and not isinstance(options, Options):
+        raise InputError(f"options: expected Options(…), got {type(options).__name__}")
 
 
 def make_camera(rig: Rig, size: tuple[int, int]) -> Camera:

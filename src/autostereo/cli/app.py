@@ -6,6 +6,7 @@ import inspect
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
@@ -73,7 +74,9 @@ def run(arguments: Sequence[str]) -> int:
     arguments = list(arguments) or ["--help"]
     debug = os.environ.get("AUTOSTEREO_DEBUG", "0") not in ("", "0")
     try:
-        status = typer.main.get_command(app).main(args=arguments, prog_name="autostereo", standalone_mode=False)
+        with warnings.catch_warnings():
+            warnings.showwarning = lambda message, *_, **__: common.note(f"autostereo: note: {message}")
+            status = typer.main.get_command(app).main(args=arguments, prog_name="autostereo", standalone_mode=False)
         sys.stdout.flush()
     except KeyboardInterrupt:
         status = 130

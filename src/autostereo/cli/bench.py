@@ -41,7 +41,7 @@ def bench(
     from .benchmarks.contenders import BenchOptions
 
     options = BenchOptions(quick=quick, only=tuple(only or ()), data=data)
-    common.announce_compilation("cpu")
+    common.announce_compilation("cpu", "draw_views", "draw_panel")
     facts = mesh.facts(options)  # before the run, whose own load does not count
     results = mesh.run(options, common.note)
     if json is not None:

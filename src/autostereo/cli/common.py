@@ -157,7 +157,8 @@ def check_image(path: Path) -> Path:
 def whole_folder(path: Path, stale: str = "") -> Iterator[Path]:
     """Give a temporary folder to fill; when all went well its files appear in `path`, else nothing does.
 
-    In a folder that exists, files of the same name are replaced, and others that match the pattern `stale` removed.
+    In a folder that exists, files of the same name are replaced, and in a folder of views (it holds a rig.json)
+    others that match the pattern `stale` are removed.
     """
     check_output(path)
     temporary = path.parent / f".part-{secrets.token_hex(4)}"  # no suffix: it is a folder
@@ -166,9 +167,11 @@ def whole_folder(path: Path, stale: str = "") -> Iterator[Path]:
         yield temporary
         if path.is_dir():
             made = sorted(temporary.iterdir())
+            ours = (path / "rig.json").exists()  # a folder of this program's
+            leftovers = list(path.glob(stale)) if stale and ours else []
             for item in made:
                 os.replace(item, path / item.name)
-            for old in path.glob(stale) if stale else ():
+            for old in leftovers:
                 if old.name not in {item.name for item in made}:
                     old.unlink()
         else:
@@ -212,14 +215,14 @@ def working(text: str, total: int | None = None) -> Iterator[Callable[[], None]]
         yield lambda: progress.advance(task)
 
 
-def announce_compilation(engine: str) -> None:
-    """Say so when this is the run that compiles the kernels."""
+def announce_compilation(engine: str, *kernels: str) -> None:
+    """Say so when this is the run that compiles the kernels whose names begin so."""
     if engine not in ("auto", "cpu"):
         return
     from ..engines.cpu.jit import is_compiled
 
-    if not is_compiled():
-        note("compiling kernels (once, up to a minute)…")
+    if not is_compiled(*kernels):
+        note("compiling kernels (once for each kind of picture, up to a minute)…")
 
 
 # --- what the verbs work on ----------------------------------------------------------------------------------------

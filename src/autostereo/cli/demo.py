@@ -44,7 +44,7 @@ def demo(
       autostereo demo -o /tmp/demo
     """
     with common.whole_folder(output) as folder:
-        common.announce_compilation("cpu")
+        common.announce_compilation("cpu", "draw_views", "draw_panel")
         from ..render import Renderer
         from ..scene.shapes import demo_scene
 

@@ -64,7 +64,7 @@ def quilt(
     from ..encoders.quilt import save_quilt
     from ..render import render_views
 
-    common.announce_compilation(engine)
+    common.announce_compilation(engine, "draw_views")
     with common.working(f"rendering {rig.views} views"):
         stack = render_views(scene, rig, layout.tile, method=method, engine=engine, options=options)
     with common.working("writing"):

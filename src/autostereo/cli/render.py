@@ -48,7 +48,8 @@ def render(
 
     from ..render import render as draw
 
-    common.announce_compilation(engine)
+    one_pass = where.viewmap is not None and method == "single-pass"
+    common.announce_compilation(engine, "draw_panel" if one_pass else "draw_views")
     start = perf_counter()
     with common.working("rendering"):
         panel = draw(scene, where, rig, method=method, engine=engine, options=options)

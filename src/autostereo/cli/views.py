@@ -61,7 +61,7 @@ def views(
 
     from ..render import render_views
 
-    common.announce_compilation(engine)
+    common.announce_compilation(engine, "draw_views")
     with common.working(f"rendering {rig.views} views"):
         stack = render_views(scene, rig, shape, method=method, engine=engine, options=options)
     with common.working("writing", None):

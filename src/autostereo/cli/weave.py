@@ -48,9 +48,15 @@ def weave(
     common.check_views(views)
     if where.viewmap is not None and where.viewmap.table is None:
         where = where.with_views(columns * rows if views is None else views)
+    elif where.viewmap is not None and views is None and columns * rows != where.views:
+        raise InputError(
+            f"{quilt}: {columns}×{rows} tiles, but the mask of {where.name} has {where.views} views; "
+            f"give --views {where.views} to take the first {where.views} tiles"
+        )
     if where.viewmap is None:
         raise InputError(f"{where.name}: a {where.layout} picture is not woven from a quilt")
     common.check_image(output)
+    common.announce_compilation("cpu", "_weave")
     pixels = common.load_picture(quilt, alpha=True)
     from ..engines.cpu.gather import weave as draw
     from ..image import write_image

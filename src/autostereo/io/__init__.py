@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from ..errors import FileError, InputError
 from ..scene.mesh import Mesh
 from ..scene.scene import Scene
@@ -57,7 +59,8 @@ def load(*paths: PathLike) -> Scene:
                 raise FileError(f"{path}: is a folder, not a file")
             raise FileError(f"{path}: unknown kind of file {path.suffix!r}; known are {' '.join(LOADERS)}")
         try:
-            objects += loader(path)
+            with np.errstate(all="ignore"):  # broken numbers are found by the checks of the objects
+                objects += loader(path)
         except InputError as error:  # a Mesh does not know where its arrays came from
             raise FileError(f"{path}: {error}") from error
         except MemoryError:

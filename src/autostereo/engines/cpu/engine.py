@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from ...scene.scene import Scene
 from ..engine import Draw, Target
 from . import gather
-from .jit import is_compiled
 from .mesh_panel import PanelNumbers, draw_panel
 from .mesh_raster import Scratch, Shader, Surface
 from .mesh_reuse import exact_offsets
@@ -33,8 +32,6 @@ from .mesh_views import draw_views
 from .panel_plan import Plans, make_plans
 from .scene_arrays import SceneArrays, background_word, light_array, scene_arrays
 from .threads import run_rows
-
-__all__ = ["CpuEngine", "is_compiled"]
 
 BAND_BYTES = 160_000  # of samples: with what else a band touches it stays in L2
 PANEL_ROWS = 4  # rows of a panel per bin

@@ -68,8 +68,8 @@ def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     return _compile(function, forceinline=True, _nrt=False)
 
 
-def is_compiled() -> bool:
-    """True when the cache holds compiled kernels of this version, so that the first render starts at once."""
+def is_compiled(*names: str) -> bool:
+    """True when the cache holds this version's kernels whose names begin so: what uses them starts at once."""
     if config.DISABLE_JIT:
         return True
-    return CACHE is not None and any(CACHE.rglob("*draw_panel*.nbc"))
+    return CACHE is not None and all(any(CACHE.rglob(f"*.{name}*.nbc")) for name in names)
