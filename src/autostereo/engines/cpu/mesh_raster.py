@@ -131,7 +131,7 @@ def cut_triangle(vertices, corners, odd, y, camera):
 
 @inlined
 def fill_segment(attributes, left, right, first, columns, segment):
-    """Attributes first … first + columns at the segment's left end, and their difference to the right end."""
+    """Attributes first … first + columns: at the left end in segment[:16], the difference to the right in [16:]."""
     u, a, b = left[3], left[4], left[5]
     w, c, d = right[3], right[4], right[5]
     for k in range(columns):

@@ -28,8 +28,6 @@ FLOAT_ROWS = 28
 ADDRESS, COLOR, BASE, END, PLACE = (np.uint64(k * STRIDE) for k in range(5))
 INT_ROWS = 5
 
-SEGMENT_ATTRIBUTES = 16  # segment[0:16] at the left end, segment[16:32] the difference to the right end
-
 ZERO, HALF, ONE, BYTE = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(255.0)
 TINY = np.float32(1e-20)
 ALPHA = np.int32(-0x1000000)
