@@ -15,6 +15,7 @@ __version__ = "0.1.0"
 _HOME = {
     "errors": ["AutostereoError", "InputError", "FileError", "UnsupportedError", "DependencyError", "MemoryLimitError"],
     "scene.mesh": ["Mesh"],
+    "scene.points": ["Points"],
     "scene.appearance": ["Material", "DirectionalLight", "PointLight"],
     "scene.scene": ["Scene"],
     "display.rig": ["Rig"],
@@ -51,6 +52,7 @@ if TYPE_CHECKING:  # "as" tells type checkers that a name is public
     from .scene.appearance import Material as Material
     from .scene.appearance import PointLight as PointLight
     from .scene.mesh import Mesh as Mesh
+    from .scene.points import Points as Points
     from .scene.scene import Scene as Scene
     from .viewmap import ViewMap as ViewMap
 

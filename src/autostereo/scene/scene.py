@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .appearance import DirectionalLight, Light, PointLight, Vector, check_vector
 from .mesh import Mesh
+from .points import Points
 
-PRIMITIVES = (Mesh,)
-SceneObject = Mesh
+PRIMITIVES = (Mesh, Points)
+SceneObject = Mesh | Points
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +38,7 @@ class Scene:
     def __post_init__(self) -> None:
         objects = (self.objects,) if isinstance(self.objects, PRIMITIVES) else self.objects
         if not isinstance(objects, Iterable):
-            raise InputError(f"objects: expected a Mesh or a sequence of them, got {type(objects).__name__}")
+            raise InputError(f"objects: expected an object or a sequence of them, got {type(objects).__name__}")
         objects = tuple(objects)
         if not objects:
             raise InputError("objects: expected at least one, got none")
