@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...scene.scene import Scene
 from ..engine import Draw, Target
 from . import gather
-from .mesh_panel import PanelNumbers, draw_panel
+from .mesh_panel import Block, Panel, draw_panel
 from .mesh_raster import Scratch, Shader, Surface
 from .mesh_reuse import exact_offsets
 from .mesh_setup import (
@@ -29,12 +29,13 @@ from .mesh_setup import (
 )
 from .mesh_shade import FLOAT_ROWS, INT_ROWS, STRIDE
 from .mesh_views import draw_views
-from .panel_plan import Plans, make_plans
+from .panel_lines import BUCKET, LinePlan, line_capacity, plan_lines
 from .scene_arrays import SceneArrays, background_word, light_array, scene_arrays
 from .threads import run_rows
 
+PANEL_BYTES = 230_000  # of a panel's samples and their offsets, likewise
 BAND_BYTES = 160_000  # of samples: with what else a band touches it stays in L2
-PANEL_ROWS = 4  # rows of a panel per bin
+PANEL_COLUMNS = 2048  # most pixels of a panel's block
 VERTEX_CHUNK = 8192
 _counting = threading.Lock()
 
@@ -51,13 +52,12 @@ class Prepared:
     plan: tuple[Any, ...] | None = None
     lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def plans(self, draw: Draw) -> Plans:
-        """The plans of the panel's rows, those of the frame before if they still fit."""
+    def lines(self, draw: Draw) -> LinePlan:
+        """The plan of the panel's lines, that of the frame before if it still fits."""
         assert draw.viewmap is not None
-        key = (draw.viewmap, draw.camera.width, draw.camera.height, draw.flip_x, draw.flip_y, draw.offsets.tobytes())
+        key = (draw.viewmap, draw.camera.width, draw.flip_x, draw.offsets.tobytes())
         if self.plan is None or self.plan[0] != key:
-            size = (draw.camera.width, draw.camera.height)
-            self.plan = key, make_plans(draw.viewmap, size, (draw.flip_x, draw.flip_y), draw.offsets)
+            self.plan = key, plan_lines(draw.viewmap, draw.camera.width, draw.flip_x, draw.offsets)
         return self.plan[1]
 
     def pool(self, key: tuple[Any, ...], make: Any) -> Pool:
@@ -137,40 +137,31 @@ class CpuEngine:
         run_rows(-(-height // rows_per_band) * blocks, task)
 
     def _draw_panel(self, prepared: Prepared, draw: Draw, target: Target) -> None:
-        assert draw.viewmap is not None
         height, width, _ = target.color.shape
-        surface, camera, shader = surface_at(prepared, draw, (PANEL_ROWS, width, 1))
+        plan = prepared.lines(draw)
+        columns, rows = panel_blocks(width)
+        blocks = -(-width // columns)
+        surface, camera, shader = surface_at(prepared, draw, (rows, columns, blocks))
         side = round(draw.options.samples**0.5)
-        flips = (draw.flip_x, draw.flip_y)
-        panel = PanelNumbers(gather.map_args(draw.viewmap), *flips, draw.options.sampling == "subpixel")
-        plans = prepared.plans(draw)
-        total = plans.x.shape[1]
-        sums = 3 * width if side > 1 else 0
+        panel = Panel(plan, draw.flip_x, draw.flip_y, draw.options.sampling == "subpixel")
+        samples, capacity = rows * columns * 3, line_capacity(plan, columns)
+        sums = samples if side > 1 else 0
         exact = (len(shader.exact), width)
-        pool = prepared.pool(("panel", total, sums, exact), lambda: (new_row(total), new_scratch(total, sums, exact)))
+        pool = prepared.pool(
+            ("panel", rows, columns, capacity, sums, exact),
+            lambda: (new_block(rows, columns, capacity), new_scratch(samples, sums, exact)),
+        )
         background = background_word(prepared.scene)
-        empty_row = np.tile(np.array([background]).view(np.uint8)[:3], width)
 
         def task(first: int, end: int) -> None:
-            with pool as (row_memory, scratch):
-                bands = (first, end, PANEL_ROWS)
+            with pool as (block, scratch):
+                bins = (first, end, rows, blocks, columns)
                 draw_panel(
-                    bands,
-                    surface,
-                    camera,
-                    shader,
-                    panel,
-                    plans,
-                    background,
-                    empty_row,
-                    side,
-                    row_memory,
-                    scratch,
-                    target.color,
+                    bins, surface, camera, shader, panel, block, background, side, scratch, target.color
                 )
                 count_samples(target, scratch)
 
-        run_rows(-(-height // PANEL_ROWS), task)
+        run_rows(-(-height // rows) * blocks, task)
 
 
 class Pool:
@@ -216,14 +207,24 @@ def count_samples(target: Target, scratch: Scratch) -> None:
     scratch.counts[:] = 0
 
 
-def new_row(total: int) -> tuple[NDArray[Any], ...]:
-    """One thread's memory for a panel row of `total` samples: offsets, places, scratch, finished values."""
-    return (
-        np.zeros(total, np.float32),
-        np.zeros(total, np.float32),
-        np.zeros(total, np.float64),
-        np.zeros(total + 3, np.uint8),
+def new_block(rows: int, columns: int, capacity: int) -> Block:
+    """One thread's memory for a panel's block whose rows have at most `capacity` lines."""
+    return Block(
+        np.zeros(rows * columns * 3, np.float32),
+        np.zeros((rows, 3, capacity), np.float32),
+        np.zeros((rows, capacity), np.int32),
+        np.zeros((rows, (columns >> BUCKET) + 2), np.int32),
+        np.zeros((3, capacity), np.float32),
+        np.zeros(capacity, np.int32),
+        np.zeros(columns, np.float64),
     )
+
+
+def panel_blocks(width: int) -> tuple[int, int]:
+    """Columns of a panel's block and rows of a band for which samples and offsets stay in cache."""
+    blocks = -(-width // PANEL_COLUMNS)
+    columns = (-(-width // blocks) + 15) // 16 * 16
+    return columns, int(np.clip(PANEL_BYTES // (36 * columns), 1, 16))
 
 
 def view_blocks(views: int, width: int) -> tuple[int, int]:

@@ -50,7 +50,7 @@ def map_args(viewmap: ViewMap) -> MapArgs:
 
 
 @kernel
-def _cell(mode, x, y):
+def cell_of(mode, x, y):
     """`viewmap.cell_index` of one pixel, y counted from the bottom."""
     if mode == 1:
         return (x + y) % 2
@@ -99,7 +99,7 @@ def row_phase(r, width, table, a, b, offsets, cell_mode, height, views, continuo
         y = height - 1 - r
         for x in range(width):
             t = a * x + br
-            cell = _cell(cell_mode, x, y) % offsets.shape[0]
+            cell = cell_of(cell_mode, x, y) % offsets.shape[0]
             for c in range(3):
                 out[x, c] = t + offsets[cell, c]
     _wrap(out.reshape(-1), reverse)

@@ -99,34 +99,28 @@ class Shader(NamedTuple):
 
 
 @inlined
-def cut_edge(vertices, top, bottom, y, camera):
-    """Where row y crosses an edge: x at the centre, focal/depth, shift per unit of offset, perspective parameter.
+def edge_through(vertices, top, bottom):
+    """An edge as `cut_edge` needs it.
 
-    Always from the upper to the lower vertex, so that triangles sharing the edge get the same bits.
+    Always from the upper to the lower vertex, so that triangles sharing the edge cut it at the same bits.
     """
-    y_top, z_top = vertices[top, 1], vertices[top, 2]
-    t = (y - y_top) / (vertices[bottom, 1] - y_top)
-    x = vertices[top, 0] + t * (vertices[bottom, 0] - vertices[top, 0])
-    z = z_top + t * (vertices[bottom, 2] - z_top)
-    shift = camera.fx / camera.focal * (1.0 - z)
-    return np.float32(x), np.float32(z), np.float32(shift), np.float32(t * vertices[bottom, 2] / z)
+    x, y, z = vertices[top, 0], vertices[top, 1], vertices[top, 2]
+    below = vertices[bottom, 2]
+    per_row = 1.0 / (vertices[bottom, 1] - y)
+    return x, y, z, (vertices[bottom, 0] - x) * per_row, (below - z) * per_row, per_row * below, top, bottom
 
 
 @inlined
-def cut_triangle(vertices, corners, odd, y, camera):
-    """The two edges of a triangle that row y crosses, front side's left edge first.
+def cut_edge(edge, y, scale):
+    """Where row y crosses an edge: x at the centre, focal/depth, shift per unit of offset, perspective parameter, ends.
 
-    corners = (top, middle, bottom); odd: the long edge is the left one. Each edge is its cut_edge values and vertices.
+    scale = fx/focal.
     """
-    a, b, c = corners
-    top, bottom = (a, b) if y < vertices[b, 1] else (b, c)
-    x, z, p, u = cut_edge(vertices, a, c, y, camera)
-    long_edge = (x, z, p, u, a, c)
-    x, z, p, u = cut_edge(vertices, top, bottom, y, camera)
-    short_edge = (x, z, p, u, top, bottom)
-    if odd:
-        return long_edge, short_edge
-    return short_edge, long_edge
+    x, top, z, slope_x, slope_z, slope_u, a, b = edge
+    down = y - top
+    z = z + down * slope_z
+    u = np.float32(down * slope_u) / np.float32(z)
+    return np.float32(x + down * slope_x), np.float32(z), np.float32(scale * (1.0 - z)), u, a, b
 
 
 @inlined

@@ -8,10 +8,12 @@ segment in lists first, so that it is SIMD over visible samples only.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_raster import cut_triangle, fill_segment, fill_uv, row_geometry, rows_of, uv_gradient
+from .mesh_block import draw_block
 from .mesh_reuse import finish_list, shade_exact
 from .mesh_shade import (
     ADDRESS,
@@ -29,7 +31,6 @@ from .mesh_shade import (
 )
 from .samples import COLOR_MASK, DEPTH_SHIFT, clear_samples, hit, nearer, plain_color, word
 
-NO_GRADIENT = (ZERO,) * 11
 VIEWS_AT_ONCE = 512  # leaves the lists room for the samples of two steps
 
 
@@ -105,41 +106,38 @@ def test_lanes(views, first_view, k, sample_x, ends, depths, offsets, lists):
         lists[LANE_Z + v] = z if step < lists[RUN + v] else ZERO
 
 
+class Place(NamedTuple):
+    """What draw_segment reads of a block: offsets (V,) float32, columns (first, end), sample_x, width of the picture."""
+
+    offsets: np.ndarray
+    first: int
+    end: int
+    sample_x: np.float32
+    width: np.float32
+
+
 @inlined
-def draw_segment(
-    block,
-    ends,
-    depths,
-    plain,
-    shader,
-    shading,
-    offsets,
-    band,
-    segment,
-    lists,
-    ints,
-    words,
-    halves,
-    colors,
-    spans,
-    counts,
-    width,
-):
+def draw_segment(place, row, ends, depths, plain, shader, shading, scratch):
     """Draw one segment in every view; shading = (material, side, row, gradient)."""
-    low, high, sample_x, row, stride = block
+    offsets, sample_x = place.offsets, place.sample_x
+    lists, ints, segment, band = scratch.lists, scratch.ints, scratch.segment, scratch.band
+    colors, spans, counts = scratch.colors, scratch.spans, scratch.counts
+    low, high = np.float32(place.first), np.float32(place.end)
+    stride = np.int32(place.end - place.first)
+    base = np.int32(row) * stride * np.int32(offsets.shape[0])
     color = (segment[0], segment[1], segment[2], segment[16], segment[17], segment[18])
     if shader.exact.shape[0] > 0 and not plain:
-        shade_exact(ends, depths, sample_x, width, shader, shading, segment, lists, ints, colors, spans)
+        shade_exact(ends, depths, sample_x, place.width, shader, shading, segment, lists, ints, colors, spans)
     n = np.uint64(0)
     for first in range(0, offsets.shape[0], VIEWS_AT_ONCE):
         first_view = np.uint64(first)
         views = np.uint64(min(VIEWS_AT_ONCE, offsets.shape[0] - first))
-        here = (low, high, sample_x, row + np.int32(first) * stride, stride)
+        here = (low, high, sample_x, base + np.int32(first) * stride, stride)
         longest = find_runs(views, first_view, ends, here, offsets, lists, ints)
         for k in range(longest):
             if plain:
-                make_words(views, first_view, k, sample_x, ends, depths, color, offsets, lists, halves)
-                keep_nearer(views, k, ints, words, band)
+                make_words(views, first_view, k, sample_x, ends, depths, color, offsets, lists, scratch.halves)
+                keep_nearer(views, k, ints, scratch.words, band)
                 continue
             test_lanes(views, first_view, k, sample_x, ends, depths, offsets, lists)
             n = list_visible(views, first_view, k, n, np.float32(k) + sample_x, offsets, lists, ints, band)
@@ -148,71 +146,6 @@ def draw_segment(
                 n = np.uint64(0)
     if n > np.uint64(0):
         finish_list(n, sample_x, shader, shading, segment, lists, ints, colors, spans, counts, band)
-
-
-@inlined
-def draw_block(rows, columns, bin_index, surface, camera, shader, offsets, sample, scratch):
-    """Draw rows (first, end) and columns (first, end) of every view; sample = (x, y) of the sample in its pixel."""
-    vertices, attributes, uv, wanted = surface.vertices, surface.attributes, surface.uv, surface.columns
-    triangles, bins, face_material, materials = (
-        surface.triangles,
-        surface.bins,
-        surface.face_material,
-        surface.materials,
-    )
-    band, segment, lists, ints, words = scratch.band, scratch.segment, scratch.lists, scratch.ints, scratch.words
-    halves, colors, spans, counts = scratch.halves, scratch.colors, scratch.spans, scratch.counts
-    sample_x, sample_y = np.float32(sample[0]), sample[1]
-    stride = np.int32(columns[1] - columns[0])
-    row_words = offsets.shape[0] * (columns[1] - columns[0])
-    for entry in range(surface.bin_start[bin_index], surface.bin_start[bin_index + 1]):
-        index = np.uint64(bins[entry])
-        code = triangles[index, 3]
-        corners = (np.uint64(triangles[index, 0]), np.uint64(triangles[index, 1]), np.uint64(triangles[index, 2]))
-        m = np.uint64(face_material[code >> 1])
-        sides = 2 if materials[m, 4] != ZERO else 1
-        material = (materials[m, 0], materials[m, 1], materials[m, 2], materials[m, 3], materials[m, 5])
-        textured, plain = materials[m, 5] >= ZERO, not shader.per_sample and materials[m, 6] != ZERO
-        gradient = uv_gradient(vertices, uv, corners, camera) if textured else NO_GRADIENT
-        row0, row1 = rows_of(vertices, corners, sample_y, rows[0], rows[1])
-        for r in range(row0, row1):
-            y = r + sample_y
-            left, right = cut_triangle(vertices, corners, code & 1, y, camera)
-            block = (
-                np.float32(columns[0]),
-                np.float32(columns[1]),
-                sample_x,
-                np.int32((r - rows[0]) * row_words),
-                stride,
-            )
-            for side in range(sides):
-                if side == 1:
-                    left, right = right, left
-                ends, depths = (left[0], left[2], right[0], right[2]), (left[1], right[1])
-                first = 6 if side == 1 and not shader.per_sample else 0
-                fill_segment(attributes, left, right, first, wanted, segment)
-                if textured:
-                    fill_uv(uv, corners, left, right, segment)
-                shading = (material, side, row_geometry(y, camera), gradient)
-                draw_segment(
-                    block,
-                    ends,
-                    depths,
-                    plain,
-                    shader,
-                    shading,
-                    offsets,
-                    band,
-                    segment,
-                    lists,
-                    ints,
-                    words,
-                    halves,
-                    colors,
-                    spans,
-                    counts,
-                    np.float32(camera.width),
-                )
 
 
 @inlined
@@ -294,7 +227,8 @@ def draw_views(bins, surface, camera, shader, offsets, background, side, scratch
         for s in range(side * side):
             clear_samples(count, background, scratch.band)
             sample = ((s % side + 0.5) / side, (s // side + 0.5) / side)
-            draw_block(rows, columns, k, surface, camera, shader, offsets, sample, scratch)
+            place = Place(offsets, columns[0], columns[1], np.float32(sample[0]), np.float32(width))
+            draw_block(draw_segment, place, rows, k, surface, camera, shader, sample, scratch)
             if side > 1:
                 add_samples(count, scratch.band, scratch.sums)
             if depth.size > 0:
