@@ -16,6 +16,8 @@ _HOME = {
     "errors": ["AutostereoError", "InputError", "FileError", "UnsupportedError", "DependencyError", "MemoryLimitError"],
     "scene.mesh": ["Mesh"],
     "scene.points": ["Points"],
+    "scene.volume": ["Volume"],
+    "scene.transfer": ["TransferFunction"],
     "scene.appearance": ["Material", "DirectionalLight", "PointLight"],
     "scene.scene": ["Scene"],
     "display.rig": ["Rig"],
@@ -54,6 +56,8 @@ if TYPE_CHECKING:  # "as" tells type checkers that a name is public
     from .scene.mesh import Mesh as Mesh
     from .scene.points import Points as Points
     from .scene.scene import Scene as Scene
+    from .scene.transfer import TransferFunction as TransferFunction
+    from .scene.volume import Volume as Volume
     from .viewmap import ViewMap as ViewMap
 
 

@@ -12,9 +12,10 @@ from ..errors import InputError
 from .appearance import DirectionalLight, Light, PointLight, Vector, check_vector
 from .mesh import Mesh
 from .points import Points
+from .volume import Volume
 
-PRIMITIVES = (Mesh, Points)
-SceneObject = Mesh | Points
+PRIMITIVES = (Mesh, Points, Volume)
+SceneObject = Mesh | Points | Volume
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,284 @@
+"""Transfer functions: from scalar values to colour and opacity."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import FileError, InputError
+from ..image import write_atomic
+from .appearance import check_number
+
+if TYPE_CHECKING:
+    from .volume import Volume
+
+Array = NDArray[np.float64]
+
+
+def _check_points(points: ArrayLike) -> Array:
+    """Return control points as a checked (K, 5) float64 array, or raise an error that names what is wrong."""
+    try:
+        p = np.array(points, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError("transfer points: expected rows of five numbers (value, r, g, b, opacity)") from None
+    if p.ndim != 2 or p.shape[1] != 5 or len(p) == 0:
+        raise InputError(f"transfer points: expected rows (value, r, g, b, opacity), got shape {p.shape}")
+    if not np.isfinite(p).all():
+        raise InputError("transfer points: expected finite numbers, found NaN or infinity")
+    if np.abs(p[:, 0]).max() > 1e30 or p[:, 4].max() > 1e30:
+        raise InputError("transfer points: values and opacities beyond ±1e30 cannot be used")
+    if (np.diff(p[:, 0]) < 0).any():
+        k = int(np.argmax(np.diff(p[:, 0]) < 0))
+        raise InputError(f"transfer points: expected ascending values, found {p[k, 0]:g} before {p[k + 1, 0]:g}")
+    if len(p) > 2 and (p[2:, 0] == p[:-2, 0]).any():
+        value = p[2:, 0][p[2:, 0] == p[:-2, 0]][0]
+        raise InputError(f"transfer points: expected at most two points of one value (a step), found more at {value:g}")
+    if p[:, 1:4].min() < 0 or p[:, 1:4].max() > 1:
+        raise InputError(f"transfer points: expected colours 0…1, found {p[:, 1:4].min():g}…{p[:, 1:4].max():g}")
+    if p[:, 4].min() < 0:
+        raise InputError(f"transfer points: expected opacities ≥ 0, found {p[:, 4].min():g}")
+    return p
+
+
+def _integrals(width: Array, start: Array, end: Array) -> tuple[Array, Array, Array]:
+    """Exact integrals of τ (…,), τ·colour (…, 3) and colour (…, 3) where (r, g, b, τ) is linear over `width`."""
+    t0, t1 = start[..., 3], end[..., 3]
+    c0, c1 = start[..., :3], end[..., :3]
+    tau = width * (t0 + t1) / 2
+    product = (width / 6)[..., None] * (t0[..., None] * (2 * c0 + c1) + t1[..., None] * (c0 + 2 * c1))
+    return tau, product, (width / 2)[..., None] * (c0 + c1)
+
+
+@dataclass(frozen=True, eq=False)
+class TransferFunction:
+    """Colour and extinction, piecewise linear over scalar values and constant beyond the ends.
+
+    Parameters
+    ----------
+    points : array_like of shape (K, 5)
+        Rows (value, r, g, b, opacity), values ascending; two rows of equal value make a step (the second holds at
+        the value itself). Colours are display values 0…1. Opacity is extinction per scene unit, ≥ 0: a path of
+        length L through constant extinction τ lets exp(−τ·L) of the light through, whatever the sampling rate.
+
+    Raises
+    ------
+    InputError
+        The points do not have this form; the message says what was found.
+    """
+
+    points: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", _check_points(self.points))
+
+    @property
+    def max_opacity(self) -> float:
+        """The greatest extinction of all values, per scene unit."""
+        return float(self.points[:, 4].max())
+
+    def scaled(self, factor: float) -> TransferFunction:
+        """Return the same function with all opacities times `factor` ≥ 0."""
+        return TransferFunction(self.points * (1, 1, 1, 1, check_number("transfer factor", factor, 0.0)))
+
+    # --- values ----------------------------------------------------------------------------------------------------
+    def evaluate(self, s: ArrayLike) -> Array:
+        """Return (r, g, b, extinction) at scalar values `s` of any shape, as shape (*s.shape, 4)."""
+        return self._limit(np.asarray(s, dtype=np.float64), "right")
+
+    def _limit(self, s: Array, side: str) -> Array:
+        """The function's limit from the `side` "right" or "left" (they differ at steps only)."""
+        value, rows = self.points[:, 0], self.points[:, 1:]
+        upper = np.searchsorted(value, s, side=side)  # type: ignore[call-overload]
+        first, second = np.maximum(upper - 1, 0), np.minimum(upper, len(value) - 1)
+        width = value[second] - value[first]
+        part = np.where(width > 0, (s - value[first]) / np.where(width > 0, width, 1.0), 0.0)[..., None]
+        return rows[first] * (1 - part) + rows[second] * part
+
+    @cached_property
+    def _cumulative(self) -> tuple[Array, Array, Array]:
+        """`_integrals` from the first point to every point: (K,), (K, 3), (K, 3)."""
+        rows = self.points[:, 1:]
+        parts = _integrals(np.diff(self.points[:, 0]), rows[:-1], rows[1:])
+        return tuple(np.concatenate([np.zeros((1, *p.shape[1:])), np.cumsum(p, axis=0)]) for p in parts)  # type: ignore[return-value]
+
+    def mean(self, s_front: ArrayLike, s_back: ArrayLike) -> Array:
+        """Exact means over a path on which the scalar runs linearly from `s_front` to `s_back`.
+
+        Extinction is averaged as it is, colour weighted by extinction (where that is 0 all along: as it is). This
+        is the pre-integration of Engel, Kraus and Ertl 2001 (equation 10: attenuation within the segment
+        neglected), in closed form: products of two linear functions are integrated exactly.
+
+        Parameters
+        ----------
+        s_front, s_back : array_like
+            Scalars at the two ends; they are broadcast.
+
+        Returns
+        -------
+        ndarray of shape (..., 4)
+            Mean (r, g, b, extinction).
+        """
+        front, back = np.broadcast_arrays(np.asarray(s_front, np.float64), np.asarray(s_back, np.float64))
+        low, high = np.minimum(front, back), np.maximum(front, back)
+        value, rows = self.points[:, 0], self.points[:, 1:]
+        first, last = np.searchsorted(value, low, side="right"), np.searchsorted(value, high, side="right")
+        at_low, at_high = self.evaluate(low), self.evaluate(high)
+        # a path within one piece of the function is one trapezium; else: rest of the first piece, whole ones, the last
+        within = first == last
+        i, j = np.minimum(first, len(value) - 1), np.maximum(last - 1, 0)
+        head = _integrals(np.where(within, high - low, value[i] - low), at_low, np.where(within[..., None], at_high, rows[i]))
+        tail = _integrals(np.where(within, 0.0, high - value[j]), rows[j], at_high)
+        total = []
+        for h, t, cumulative in zip(head, tail, self._cumulative, strict=True):
+            whole = cumulative[j] - cumulative[i]
+            total.append(h + t + np.where(within.reshape(within.shape + (1,) * (whole.ndim - within.ndim)), 0.0, whole))
+        tau, product, plain = total
+        length = high - low
+        flat = length == 0
+        result = np.empty((*length.shape, 4))
+        safe = np.where(flat, 1.0, length)
+        result[..., 3] = np.where(flat, at_low[..., 3], tau / safe)
+        lit = tau > 0
+        weighted = product / np.where(lit, tau, 1.0)[..., None]
+        color = np.where(lit[..., None], weighted, plain / safe[..., None])
+        result[..., :3] = np.clip(np.where(flat[..., None], at_low[..., :3], color), 0.0, 1.0)
+        return result
+
+    def table(self, low: float, high: float, size: int = 256, length: float = 1.0) -> NDArray[np.float32]:
+        """2-D pre-integration table (Engel, Kraus and Ertl 2001, equations 8 and 9) over a grid of scalars.
+
+        A slab whose scalar runs linearly from `front` to `back` has alpha = 1 − exp(−extinction·L) for any length L.
+        Its emission is colour·alpha; the colour accounts for the attenuation within a slab of the given `length`.
+
+        Parameters
+        ----------
+        low, high : float
+            Scalars of the first and last row and column.
+        size : int
+            Rows and columns, ≥ 2.
+        length : float
+            Length of the slab in scene units, ≥ 0; 0 neglects the attenuation within.
+
+        Returns
+        -------
+        ndarray of shape (size, size, 4), float32
+            [front, back] → (r, g, b, mean extinction).
+        """
+        from .preintegration import preintegrate
+
+        return preintegrate(self, low, high, size, length)
+
+    # --- making ----------------------------------------------------------------------------------------------------
+    @staticmethod
+    def presets() -> tuple[str, ...]:
+        """Names for `preset`."""
+        from .transfer_presets import PRESETS
+
+        return tuple(PRESETS)
+
+    @staticmethod
+    def preset(
+        name: str, low: float | None = None, high: float | None = None, scale: float = 1.0
+    ) -> TransferFunction:
+        """Return a named transfer function.
+
+        Parameters
+        ----------
+        name : str
+            One of `presets()`.
+        low, high : float, optional
+            Values on which the range of the preset is mapped. None: its own, Hounsfield units for those of CT
+            (−1000…2000), else 0…1.
+        scale : float
+            Extinction per scene unit that the preset's opacity 1 stands for. Presets are made to look right at
+            1 / (diagonal of the volume).
+        """
+        from .transfer_presets import make_preset
+
+        return TransferFunction(make_preset(name, low, high, scale))
+
+    @staticmethod
+    def colormap(
+        name: str, low: float = 0.0, high: float = 1.0, opacity: float | Sequence[float] = 1.0
+    ) -> TransferFunction:
+        """Return a colour map over low…high.
+
+        Parameters
+        ----------
+        name : str
+            A built-in one (viridis, gray, hot, …), or any name that matplotlib knows, when it is installed.
+        low, high : float
+            Values of the first and the last colour.
+        opacity : float or sequence of float
+            Extinction per scene unit: a number is reached at `high`, in a ramp from 0 at `low`; numbers are spread
+            evenly over low…high.
+
+        Raises
+        ------
+        DependencyError
+            The map is not built in and matplotlib is not installed.
+        """
+        from .transfer_presets import make_colormap
+
+        return TransferFunction(make_colormap(name, low, high, opacity))
+
+    @staticmethod
+    def suggest(volume: Volume | ArrayLike, diagonal: float | None = None) -> TransferFunction:
+        """Return a transfer function that shows something of any data: neither empty nor opaque.
+
+        Parameters
+        ----------
+        volume : Volume or array_like of shape (nz, ny, nx)
+        diagonal : float, optional
+            Length of the diagonal of the bounds in scene units. None: the volume's, or voxels of size 1.
+        """
+        from .transfer_suggest import suggest_points
+        from .volume import Volume
+
+        if isinstance(volume, Volume):
+            values = volume.values
+            diagonal = volume.diagonal if diagonal is None else diagonal
+        else:
+            values = np.asarray(volume)
+        return TransferFunction(suggest_points(values, diagonal))
+
+    # --- files -----------------------------------------------------------------------------------------------------
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write JSON: {"points": [[value, r, g, b, opacity], …]}."""
+        rows = ",\n    ".join(json.dumps(row) for row in self.points.tolist())
+        text = f'{{\n  "type": "autostereo transfer function",\n  "points": [\n    {rows}\n  ]\n}}\n'
+        return write_atomic(path, lambda file: file.write(text.encode()))
+
+    @staticmethod
+    def load(path: str | os.PathLike[str]) -> TransferFunction:
+        """Read what `save` wrote.
+
+        Raises
+        ------
+        FileError
+            The file is missing or not a transfer function; the message names it.
+        """
+        path = Path(path)
+        try:
+            data = json.loads(path.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            raise FileError(f"{path}: no such file") from None
+        except OSError as error:
+            raise FileError(f"{path}: cannot be read ({error.strerror or error})") from None
+        except ValueError as error:
+            raise FileError(f"{path}: is not JSON ({error})") from None
+        points = data.get("points") if isinstance(data, dict) else data
+        if not isinstance(points, list):
+            raise FileError(f'{path}: expected {{"points": [[value, r, g, b, opacity], …]}}')
+        try:
+            return TransferFunction(points)  # type: ignore[arg-type]
+        except InputError as error:
+            raise FileError(f"{path}: {error}") from None
