@@ -161,9 +161,9 @@ def test_missing_folder_unknown_and_empty(tmp_path):
     refused(tmp_path, "is a folder")
     (tmp_path / "folder.ply").mkdir()
     refused(tmp_path / "folder.ply", "is a folder")
-    (tmp_path / "a.txt").write_text("x")
-    refused(tmp_path / "a.txt", "unknown kind of file '.txt'", ".ply .obj .stl .off .glb .gltf")
-    refused(tmp_path / "a.txt" / "b.ply", "b.ply")
+    (tmp_path / "a.doc").write_text("x")
+    refused(tmp_path / "a.doc", "unknown kind of file '.doc'", ".ply .obj .stl .off .glb .gltf")
+    refused(tmp_path / "a.doc" / "b.ply", "b.ply")
     refused(Path("nul\0.ply"))
     for suffix in LOADERS:
         path = tmp_path / f"empty{suffix}"

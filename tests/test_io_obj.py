@@ -184,8 +184,7 @@ def test_a_missing_or_damaged_texture_is_named_with_the_file_that_asks(tmp_path)
 @pytest.mark.parametrize(
     ("text", "word"),
     [
-        (SQUARE, "no triangles (a point cloud)"),
-        ("nothing here\n", "is not an OBJ mesh"),
+        ("nothing here\n", "is not an OBJ file"),
         (SQUARE + "f 1 2\n", "fewer than three corners"),
         (SQUARE + "f 1 2 5\n", "asks for vertex 5, the file has 4"),
         (SQUARE + "f 0 1 2\n", "vertex 0"),

@@ -104,8 +104,8 @@ def test_useless_normals_in_a_file_are_computed_instead(tmp_path, normal):
     ("header", "body", "word"),
     [
         (["element vertex 4", "property float x"], "1 2 3 4", "no element 'vertex' with x, y, z"),
-        (VERTEX, POINTS, "no triangles (a point cloud)"),
-        ([*VERTEX, "element face 0", "property list uchar int vertex_indices"], POINTS, "no triangles"),
+        (["element vertex 0", *VERTEX[1:]], "", "no vertices"),
+        ([*VERTEX, "property float rot_0"], "0 0 0 1\n" * 4, "holds Gaussian splats"),
         (VERTEX + FACE, POINTS + "2 0 1\n2 1 2\n", "fewer than three corners"),
         (VERTEX + FACE, POINTS + "3 0 1 2\n3 0 1 4\n", "faces ask for vertices 0…4, the file has 4"),
         (VERTEX + FACE, POINTS + "3 0 1 2\n3 0 -1 2\n", "faces ask for vertices -1…2"),

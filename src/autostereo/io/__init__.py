@@ -2,26 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import FileError, InputError
-from ..scene.mesh import Mesh
-from ..scene.scene import Scene
+from ..scene.scene import Scene, SceneObject
 from .files import PathLike
 from .gltf import load_gltf
+from .las import load_las
 from .mesh import load_off, load_ply, load_stl
+from .npy import load_npy, load_npz
 from .obj import load_obj
+from .pcd import load_pcd
+from .points import load_table
 
-LOADERS: dict[str, Callable[[PathLike], list[Mesh]]] = {
+LOADERS: dict[str, Callable[[PathLike], Sequence[SceneObject]]] = {
     ".ply": load_ply,
     ".obj": load_obj,
     ".stl": load_stl,
     ".off": load_off,
     ".glb": load_gltf,
     ".gltf": load_gltf,
+    ".las": load_las,
+    ".laz": load_las,
+    ".pcd": load_pcd,
+    ".xyz": load_table,
+    ".pts": load_table,
+    ".asc": load_table,
+    ".txt": load_table,
+    ".csv": load_table,
+    ".npy": load_npy,
+    ".npz": load_npz,
 }
 
 
@@ -46,7 +59,7 @@ def load(*paths: PathLike) -> Scene:
     """
     if not paths:
         raise InputError("load: expected at least one path")
-    objects: list[Mesh] = []
+    objects: list[SceneObject] = []
     for path in paths:
         if not isinstance(path, (str, Path)) and not hasattr(path, "__fspath__"):
             raise InputError(f"load: expected a path, got {type(path).__name__}")
@@ -61,7 +74,7 @@ def load(*paths: PathLike) -> Scene:
         try:
             with np.errstate(all="ignore"):  # broken numbers are found by the checks of the objects
                 objects += loader(path)
-        except InputError as error:  # a Mesh does not know where its arrays came from
+        except InputError as error:  # objects do not know where their arrays came from
             raise FileError(f"{path}: {error}") from error
         except MemoryError:
             raise FileError(f"{path}: there is not enough memory to read it") from None

@@ -1,4 +1,4 @@
-"""Triangle meshes from PLY, STL and OFF files. (OBJ and glTF have files of their own.)"""
+"""Triangle meshes from PLY, STL and OFF files, and points from PLY. (OBJ and glTF have files of their own.)"""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from ..scene.mesh import Mesh, merge_positions
+from ..scene.points import Points
 from .files import PathLike, numbers, read_bytes, whole_numbers
 from .image import read_image
 from .ply import Ply, Ragged, read_ply
+from .points import points_of_columns
 from .polygons import triangulate, weld
 
 _COLOR_NAMES = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
@@ -32,8 +34,12 @@ def usable_normals(normals: NDArray | None) -> NDArray | None:
     return normals if normals is not None and np.isfinite(normals).all() and normals.any() else None
 
 
-def load_ply(path: PathLike) -> list[Mesh]:
-    """Read a PLY mesh: positions, normals, colours and texture coordinates of vertices or of face corners."""
+def load_ply(path: PathLike) -> list[Mesh] | list[Points]:
+    """Read a PLY file: a mesh, or points where it has no faces.
+
+    Of a mesh positions, normals, colours and texture coordinates of vertices or of face corners are read, of points
+    positions, normals, colours (else intensity, as greys) and radius.
+    """
     ply = read_ply(path)
     vertex, face = ply.elements.get("vertex", {}), ply.elements.get("face", {})
     vertices = _pick(vertex, (("x", "y", "z"),))
@@ -41,8 +47,12 @@ def load_ply(path: PathLike) -> list[Mesh]:
         raise FileError(f"{path}: the PLY file has no element 'vertex' with x, y, z")
     polygons = face.get("vertex_indices", face.get("vertex_index"))
     if not isinstance(polygons, Ragged) or not len(polygons.counts):
-        splats = "Gaussian splats" if "rot_0" in vertex else "a point cloud"
-        raise FileError(f"{path}: has no triangles ({splats}); only meshes can be drawn so far")
+        if "rot_0" in vertex:
+            raise FileError(f"{path}: holds Gaussian splats, which cannot be drawn so far")
+        if not len(vertices):
+            raise FileError(f"{path}: has no vertices")
+        columns = {name: values for name, values in vertex.items() if isinstance(values, np.ndarray)}
+        return [points_of_columns(columns, path)]
     indices = polygons.values.astype(np.int64)
     check_indices(indices, len(vertices), path)
     corner = triangulate(polygons.counts, indices, vertices)
