@@ -35,63 +35,63 @@ def preintegrate(
     if high < low:
         raise InputError(f"table: expected low ≤ high, got {low:g} and {high:g}")
     grid = np.linspace(low, high, size)
-    result = transfer.mean(grid[:, None], grid[None, :])
-    if length > 0 and high > low:
-        emission = _emission(transfer, grid, length)
-        alpha = -np.expm1(-result[..., 3] * length)
-        thick = alpha > THIN
-        result[thick, :3] = np.clip(emission[thick] / alpha[thick, None], 0.0, 1.0)
-        diagonal = np.arange(size)
-        result[diagonal, diagonal] = transfer.evaluate(grid)
-    return result.astype(np.float32)
+    cells, first = np.nonzero(np.arange(size - 1)[:, None] + np.arange(1, size) < size)
+    cells += 1
+    last = first + cells  # a path leads from grid value `first` over `cells` cells, or back
+    mean = transfer.mean(grid[first], grid[last]).astype(np.float32)
+    table = np.empty((size, size, 4), np.float32)
+    table[first, last] = table[last, first] = mean
+    table[np.arange(size), np.arange(size)] = transfer.evaluate(grid)
+    alpha = -np.expm1(-mean[:, 3] * np.float32(length))
+    thick = np.nonzero(alpha > THIN)[0]
+    if high > low and len(thick):
+        first, last = first[thick], last[thick]
+        with np.errstate(over="ignore"):  # an infinite optical depth is opaque
+            ahead, back = _emission(transfer, grid, length, (first, cells[thick])) / alpha[thick]
+        table[first, last, :3] = np.clip(ahead.T, 0.0, 1.0)
+        table[last, first, :3] = np.clip(back.T, 0.0, 1.0)
+    return table
 
 
-def _emission(transfer: TransferFunction, grid: NDArray, length: float) -> NDArray[np.float32]:
-    """Emission (size, size, 3) of slabs [front, back]; the diagonal is left 0."""
-    size = len(grid)
+def _emission(
+    transfer: TransferFunction, grid: NDArray, length: float, paths: tuple[NDArray, NDArray]
+) -> NDArray[np.float32]:
+    """Emission (2, 3, P) of P paths (grid index of the lower end, cells), seen from the lower and the upper end."""
+    first, cells = paths
     knots = transfer.points[:, 0]
     edges = np.unique(np.concatenate([grid, knots[(knots > grid[0]) & (knots < grid[-1])]]))
     place = np.searchsorted(edges, grid)  # of the grid's values among the edges
-    span = np.arange(1, size)
-    rate = length / (grid[span] - grid[0])  # scene units per scalar, for paths over 1, 2, … grid cells
+    rate = length / (grid[1:] - grid[0])  # scene units per scalar, for paths over 1, 2, … cells
     through, ahead, back = _pieces(transfer, edges, rate)
 
-    # state of the path from grid value i over `span` cells: what is put together so far
-    start = np.arange(size)
-    valid = span[:, None] + start < size
-    row, column = np.nonzero(valid)
-    position = place[column]
-    count = place[column + span[row]] - position
-    t = np.ones(len(row), np.float32)
-    e_ahead, e_back = np.zeros((3, len(row)), np.float32), np.zeros((3, len(row)), np.float32)
+    # what is put together so far of each path
+    position = place[first]
+    count = place[first + cells] - position
+    t = np.ones(len(first), np.float32)
+    done = np.zeros((2, 3, len(first)), np.float32)
     step = 1
     while True:
-        chosen = np.nonzero(count & step)[0]
-        flat = row[chosen] * through.shape[1] + position[chosen]
+        now = np.nonzero(count & step)[0]
+        flat = (cells[now] - 1) * through.shape[1] + position[now]
         t_new = through.ravel()[flat]
-        e_ahead[:, chosen] += t[chosen] * ahead.reshape(3, -1)[:, flat]
-        e_back[:, chosen] = back.reshape(3, -1)[:, flat] + t_new * e_back[:, chosen]
-        t[chosen] *= t_new
-        position[chosen] += step
+        done[0][:, now] += t[now] * ahead.reshape(3, -1)[:, flat]
+        done[1][:, now] = back.reshape(3, -1)[:, flat] + t_new * done[1][:, now]
+        t[now] *= t_new
+        position[now] += step
         if 2 * step > count.max():
-            break
+            return done
         near, far = through[:, :-step], through[:, step:]
         ahead = ahead[:, :, :-step] + near * ahead[:, :, step:]
         back = back[:, :, step:] + far * back[:, :, :-step]
         through = near * far
         step *= 2
 
-    result = np.zeros((size, size, 3), np.float32)
-    result[column, column + span[row]] = e_ahead.T
-    result[column + span[row], column] = e_back.T
-    return result
-
 
 def _pieces(
     transfer: TransferFunction, edges: NDArray, rate: NDArray
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
     """Transmittance (M, n) of the n pieces between edges at M rates, and emission (3, M, n) seen from either end."""
-    first, last = transfer._limit(edges[:-1], "right"), transfer._limit(edges[1:], "left")
+    first, last = transfer.limit(edges[:-1], "right"), transfer.limit(edges[1:], "left")
     measure = (rate[:, None] * np.diff(edges)).astype(np.float32)  # length of the path in each piece
     tau_first, tau_last = first[:, 3].astype(np.float32), last[:, 3].astype(np.float32)
     alpha = -np.expm1(-measure * (tau_first + tau_last) / 2)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,13 +48,14 @@ def _check_points(points: ArrayLike) -> Array:
     return p
 
 
-def _integrals(width: Array, start: Array, end: Array) -> tuple[Array, Array, Array]:
-    """Exact integrals of τ (…,), τ·colour (…, 3) and colour (…, 3) where (r, g, b, τ) is linear over `width`."""
-    t0, t1 = start[..., 3], end[..., 3]
-    c0, c1 = start[..., :3], end[..., :3]
-    tau = width * (t0 + t1) / 2
-    product = (width / 6)[..., None] * (t0[..., None] * (2 * c0 + c1) + t1[..., None] * (c0 + 2 * c1))
-    return tau, product, (width / 2)[..., None] * (c0 + c1)
+def _integrals(width: Array, start: Array, end: Array) -> Array:
+    """Exact integrals (7, n) of τ, τ·colour and colour over `width` (n,) where (r, g, b, τ) (4, n) is linear."""
+    (c0, t0), (c1, t1) = (start[:3], start[3]), (end[:3], end[3])
+    result = np.empty((7, len(width)))
+    result[0] = (t0 + t1) * (width / 2)
+    result[1:4] = (c0 * (2 * t0 + t1) + c1 * (t0 + 2 * t1)) * (width / 6)
+    result[4:] = (c0 + c1) * (width / 2)
+    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,30 +92,41 @@ class TransferFunction:
     # --- values ----------------------------------------------------------------------------------------------------
     def evaluate(self, s: ArrayLike) -> Array:
         """Return (r, g, b, extinction) at scalar values `s` of any shape, as shape (*s.shape, 4)."""
-        return self._limit(np.asarray(s, dtype=np.float64), "right")
+        return self.limit(s, "right")
 
-    def _limit(self, s: Array, side: str) -> Array:
-        """The function's limit from the `side` "right" or "left" (they differ at steps only)."""
-        value, rows = self.points[:, 0], self.points[:, 1:]
-        upper = np.searchsorted(value, s, side=side)  # type: ignore[call-overload]
-        first, second = np.maximum(upper - 1, 0), np.minimum(upper, len(value) - 1)
-        width = value[second] - value[first]
-        part = np.where(width > 0, (s - value[first]) / np.where(width > 0, width, 1.0), 0.0)[..., None]
-        return rows[first] * (1 - part) + rows[second] * part
+    def limit(self, s: ArrayLike, side: Literal["left", "right"]) -> Array:
+        """Return the limit (*s.shape, 4) at `s` from one side; the two differ at steps only, where "right" holds."""
+        s = np.asarray(s, dtype=np.float64)
+        flat = self._within(s.ravel(), np.searchsorted(self.points[:, 0], s.ravel(), side=side))
+        return np.ascontiguousarray(flat.T).reshape(*s.shape, 4)
+
+    def _within(self, s: Array, piece: NDArray[np.intp]) -> Array:
+        """(4, n) at `s` (n,) of the linear function of a piece: k lies between points k − 1 and k, 0 below all."""
+        value, rows = self.points[:, 0], self._rows
+        first, second = np.maximum(piece - 1, 0), np.minimum(piece, len(value) - 1)
+        start = value[first]
+        width = value[second] - start
+        width[first == second] = 1.0  # constant beyond the ends
+        part = (s - start) / width
+        return rows[:, first] * (1 - part) + rows[:, second] * part
 
     @cached_property
-    def _cumulative(self) -> tuple[Array, Array, Array]:
-        """`_integrals` from the first point to every point: (K,), (K, 3), (K, 3)."""
-        rows = self.points[:, 1:]
-        parts = _integrals(np.diff(self.points[:, 0]), rows[:-1], rows[1:])
-        return tuple(np.concatenate([np.zeros((1, *p.shape[1:])), np.cumsum(p, axis=0)]) for p in parts)  # type: ignore[return-value]
+    def _rows(self) -> Array:
+        """(r, g, b, opacity) of the points, (4, K): long inner loops are fast in NumPy."""
+        return np.ascontiguousarray(self.points[:, 1:].T)
+
+    @cached_property
+    def _cumulative(self) -> Array:
+        """`_integrals` from the first point to every point, (7, K)."""
+        parts = _integrals(np.diff(self.points[:, 0]), self._rows[:, :-1], self._rows[:, 1:])
+        return np.concatenate([np.zeros((7, 1)), np.cumsum(parts, axis=1)], axis=1)
 
     def mean(self, s_front: ArrayLike, s_back: ArrayLike) -> Array:
         """Exact means over a path on which the scalar runs linearly from `s_front` to `s_back`.
 
         Extinction is averaged as it is, colour weighted by extinction (where that is 0 all along: as it is). This
-        is the pre-integration of Engel, Kraus and Ertl 2001 (equation 10: attenuation within the segment
-        neglected), in closed form: products of two linear functions are integrated exactly.
+        is the pre-integration of Engel, Kraus and Ertl 2001 with the attenuation within the segment neglected
+        (their equation 10), in closed form: products of two linear functions are integrated exactly.
 
         Parameters
         ----------
@@ -127,30 +139,22 @@ class TransferFunction:
             Mean (r, g, b, extinction).
         """
         front, back = np.broadcast_arrays(np.asarray(s_front, np.float64), np.asarray(s_back, np.float64))
-        low, high = np.minimum(front, back), np.maximum(front, back)
-        value, rows = self.points[:, 0], self.points[:, 1:]
+        low, high = np.minimum(front, back).ravel(), np.maximum(front, back).ravel()
+        value, rows = self.points[:, 0], self._rows
         first, last = np.searchsorted(value, low, side="right"), np.searchsorted(value, high, side="right")
-        at_low, at_high = self.evaluate(low), self.evaluate(high)
-        # a path within one piece of the function is one trapezium; else: rest of the first piece, whole ones, the last
-        within = first == last
-        i, j = np.minimum(first, len(value) - 1), np.maximum(last - 1, 0)
-        head = _integrals(np.where(within, high - low, value[i] - low), at_low, np.where(within[..., None], at_high, rows[i]))
-        tail = _integrals(np.where(within, 0.0, high - value[j]), rows[j], at_high)
-        total = []
-        for h, t, cumulative in zip(head, tail, self._cumulative, strict=True):
-            whole = cumulative[j] - cumulative[i]
-            total.append(h + t + np.where(within.reshape(within.shape + (1,) * (whole.ndim - within.ndim)), 0.0, whole))
-        tau, product, plain = total
-        length = high - low
-        flat = length == 0
-        result = np.empty((*length.shape, 4))
-        safe = np.where(flat, 1.0, length)
-        result[..., 3] = np.where(flat, at_low[..., 3], tau / safe)
-        lit = tau > 0
-        weighted = product / np.where(lit, tau, 1.0)[..., None]
-        color = np.where(lit[..., None], weighted, plain / safe[..., None])
-        result[..., :3] = np.clip(np.where(flat[..., None], at_low[..., :3], color), 0.0, 1.0)
-        return result
+        at_low, at_high = self._within(low, first), self._within(high, last)
+        total = _integrals(high - low, at_low, at_high)
+        cut = np.nonzero(first != last)[0]  # these lead through points: rest of the first piece, whole ones, the last
+        i, j = first[cut], last[cut] - 1
+        head = _integrals(value[i] - low[cut], at_low[:, cut], rows[:, i])
+        tail = _integrals(high[cut] - value[j], rows[:, j], at_high[:, cut])
+        total[:, cut] = head + (self._cumulative[:, j] - self._cumulative[:, i]) + tail
+        tau, length = total[0], high - low
+        point, dark = length == 0, tau <= 0
+        color = np.where(dark, total[4:], total[1:4]) / np.where(dark, np.where(point, 1.0, length), tau)
+        result = np.where(point, at_low, np.concatenate([color, tau[None] / np.where(point, 1.0, length)]))
+        np.clip(result[:3], 0.0, 1.0, out=result[:3])
+        return np.ascontiguousarray(result.T).reshape(*front.shape, 4)
 
     def table(self, low: float, high: float, size: int = 256, length: float = 1.0) -> NDArray[np.float32]:
         """2-D pre-integration table (Engel, Kraus and Ertl 2001, equations 8 and 9) over a grid of scalars.
