@@ -138,12 +138,30 @@ PRESETS: dict[str, tuple[tuple[float, float], tuple[Point, ...]]] = {
 # evenly spaced stops #rrggbb; those of matplotlib (CC0) in 17, which differ from the whole maps by up to 9/255
 COLORMAPS = {
     "gray": "000000 ffffff",
-    "viridis": "440154 48186a 472d7b 424086 3b528b 33638d 2c728e 26828e 21918c 1fa088 28ae80 3fbc73 5ec962 84d44b addc30 d8e219 fde725",
-    "magma": "000004 0a0822 1d1147 36106b 51127c 6a1c81 832681 9c2e7f b73779 d0416f e75263 f56b5c fc8961 fea772 fec488 fde2a3 fcfdbf",
-    "inferno": "000004 0b0724 210c4a 3d0965 57106e 71196e 8a226a a32c61 bc3754 d24644 e45a31 f1731d f98e09 fcac11 f9cb35 f2ea69 fcffa4",
-    "plasma": "0d0887 310597 4c02a1 6600a7 7e03a8 9511a1 aa2395 bc3587 cc4778 da5a6a e66c5c f0804e f89540 fdac33 fdc527 f8df25 f0f921",
-    "turbo": "30123b 4040a2 466be3 4294ff 28bceb 18ddc2 32f298 6dfe62 a4fc3c cdec34 eecf3a fdac34 fb7e21 eb500e d02f05 a91601 7a0403",
-    "coolwarm": "3b4cc0 4e68d8 6282ea 779af7 8db0fe a3c2fe b9d0f9 ccd9ed dddcdc ecd3c5 f5c4ac f7b093 f4987a eb7d62 dd5f4b ca3b37 b40426",
+    "viridis": (
+        "440154 48186a 472d7b 424086 3b528b 33638d 2c728e 26828e 21918c "
+        "1fa088 28ae80 3fbc73 5ec962 84d44b addc30 d8e219 fde725"
+    ),
+    "magma": (
+        "000004 0a0822 1d1147 36106b 51127c 6a1c81 832681 9c2e7f b73779 "
+        "d0416f e75263 f56b5c fc8961 fea772 fec488 fde2a3 fcfdbf"
+    ),
+    "inferno": (
+        "000004 0b0724 210c4a 3d0965 57106e 71196e 8a226a a32c61 bc3754 "
+        "d24644 e45a31 f1731d f98e09 fcac11 f9cb35 f2ea69 fcffa4"
+    ),
+    "plasma": (
+        "0d0887 310597 4c02a1 6600a7 7e03a8 9511a1 aa2395 bc3587 cc4778 "
+        "da5a6a e66c5c f0804e f89540 fdac33 fdc527 f8df25 f0f921"
+    ),
+    "turbo": (
+        "30123b 4040a2 466be3 4294ff 28bceb 18ddc2 32f298 6dfe62 a4fc3c "
+        "cdec34 eecf3a fdac34 fb7e21 eb500e d02f05 a91601 7a0403"
+    ),
+    "coolwarm": (
+        "3b4cc0 4e68d8 6282ea 779af7 8db0fe a3c2fe b9d0f9 ccd9ed dddcdc "
+        "ecd3c5 f5c4ac f7b093 f4987a eb7d62 dd5f4b ca3b37 b40426"
+    ),
 }
 # maps whose corners are not evenly spaced: (position, r, g, b)
 CORNERS = {

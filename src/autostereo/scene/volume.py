@@ -213,7 +213,7 @@ class Volume:
         return total, edges
 
     def otsu(self) -> float:
-        """Return Otsu's threshold (1979): the value that parts the histogram with the greatest between-class variance."""
+        """Return Otsu's threshold (1979), which parts the histogram with the greatest variance between its classes."""
         counts, edges = self.histogram()
         center = (edges[:-1] + edges[1:]) / 2
         below = np.cumsum(counts)[:-1].astype(np.float64)
