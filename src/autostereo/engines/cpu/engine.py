@@ -123,7 +123,7 @@ class CpuEngine:
         sums = 4 * samples if side > 1 else 0
         exact = (len(shader.exact), width)
         pool = prepared.pool(("views", samples, sums, exact), lambda: new_scratch(samples, sums, exact))
-        offsets = draw.offsets.astype(np.float32)
+        offsets = np.pad(draw.offsets.astype(np.float32), (0, 15), mode="edge")
         background = background_word(prepared.scene)
         out = target.color.view(np.int32).reshape(views, height, width)
         depth = np.empty((0, 0, 0), np.float32) if target.depth is None else target.depth

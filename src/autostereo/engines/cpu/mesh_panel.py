@@ -30,6 +30,7 @@ from .mesh_shade import (
     X,
     Z,
     quantize,
+    whole_steps,
 )
 from .panel_lines import BUCKET, LinePlan, make_lines, row_offsets
 from .samples import hit, nearer, word
@@ -102,6 +103,7 @@ def interval(slope, misfit, period, drift, bounded_below):
 @inlined
 def find_intervals(first, count, row, ends, place, lists, ints):
     """Samples of each line that the segment may cover: place of the first and their number; returns the most."""
+    listed = count
     x1, p1, x2, p2 = ends
     plan, lines, addresses = place.plan, place.block.lines, place.block.addresses
     at, spread = place.at[4], place.at[5]
@@ -113,6 +115,7 @@ def find_intervals(first, count, row, ends, place, lists, ints):
     low2, high2 = low2 - spread * abs(by2), high2 + spread * abs(by2)
     x, samples, offset = lines[row, 0], lines[row, 1], lines[row, 2]
     address = addresses[row]
+    count = whole_steps(count)
     for i in range(count):
         k = first + i
         gap1 = (x1 + offset[k] * p1 - x[k] - at) * by1
@@ -122,9 +125,9 @@ def find_intervals(first, count, row, ends, place, lists, ints):
         lists[RUN + i] = end - start
         lists[LANE_X + i] = start
     for i in range(count):
-        ints[BASE + i] = address[first + i] + np.int32(lists[LANE_X + i]) * np.int32(plan.period)
+        ints[BASE + i] = np.int32(address[first + i] + np.int32(lists[LANE_X + i] * period))
     most = np.int32(0)
-    for i in range(count):
+    for i in range(listed):
         most = max(most, np.int32(lists[RUN + i]))
     return most
 
@@ -132,30 +135,28 @@ def find_intervals(first, count, row, ends, place, lists, ints):
 @inlined
 def place_samples(n, row, place, lists, ints):
     """Pixel position and exact camera offset of the listed samples."""
-    block, columns = place.block, np.int32(place.columns)
-    offsets, red, green, blue = block.offsets, place.at[0], place.at[1], place.at[2]
-    begin, first = np.int32(row) * np.int32(3) * columns, np.int32(place.first)
+    offsets, red, green, blue = place.block.offsets, place.at[0], place.at[1], place.at[2]
+    begin, first, columns = np.int32(row * 3 * place.columns), np.float32(place.first), np.float32(place.columns)
     for i in range(n):
         lists[LANE_OFFSET + i] = offsets[np.uint64(ints[ADDRESS + i])]
     for i in range(n):
-        k = ints[ADDRESS + i] - begin
-        at = red if k < columns else (green if k < np.int32(2) * columns else blue)
-        k = k if k < columns else (k - columns if k < np.int32(2) * columns else k - np.int32(2) * columns)
-        lists[LANE_X + i] = np.float32(k + first) + at
+        k = np.float32(np.int32(ints[ADDRESS + i] - begin))
+        at = red if k < columns else (green if k < columns + columns else blue)
+        k = k if k < columns else (k - columns if k < columns + columns else k - columns - columns)
+        lists[LANE_X + i] = (k + first) + at
 
 
 @inlined
 def make_words(n, row, columns, ends, depths, color, lists, ints, halves):
     """Words of the listed samples, the colour that of their own channel; 0 where the segment does not cover them."""
     r, g, b, dr, dg, db = color
-    begin = np.int32(row) * np.int32(3) * np.int32(columns)
-    green, blue = begin + np.int32(columns), begin + np.int32(2) * np.int32(columns)
+    begin, green, blue = np.int32(row * 3 * columns), np.float32(columns), np.float32(2 * columns)
     for i in range(n):
         covered, z, u = hit(lists[LANE_X + i], lists[LANE_OFFSET + i], ends, depths)
-        a = ints[ADDRESS + i]
-        start = r if a < green else (g if a < blue else b)
-        step = dr if a < green else (dg if a < blue else db)
-        shift = np.int32(0) if a < green else (np.int32(8) if a < blue else np.int32(16))
+        k = np.float32(np.int32(ints[ADDRESS + i] - begin))
+        start = r if k < green else (g if k < blue else b)
+        step = dr if k < green else (dg if k < blue else db)
+        shift = np.int32(0) if k < green else (np.int32(8) if k < blue else np.int32(16))
         halves[np.uint64(2) * i] = quantize(start + u * step) << shift
         halves[np.uint64(2) * i + np.uint64(1)] = np.float32(z if covered else ZERO).view(np.int32)
 
@@ -198,7 +199,7 @@ def draw_listed(n, row, place, ends, depths, plain, shader, shading, scratch):
     lists, ints, segment = scratch.lists, scratch.ints, scratch.segment
     for i in range(16):  # whole SIMD steps
         ints[ADDRESS + n + np.uint64(i)] = np.int32(row) * np.int32(3) * np.int32(place.columns)
-    whole = (n + np.uint64(15)) & ~np.uint64(15)
+    whole = whole_steps(n)
     place_samples(whole, row, place, lists, ints)
     if plain:
         color = (segment[0], segment[1], segment[2], segment[16], segment[17], segment[18])

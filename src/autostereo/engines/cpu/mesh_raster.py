@@ -36,6 +36,7 @@ from .mesh_shade import (
     modulate,
     normalize_normals,
     pack,
+    whole_steps,
 )
 from .mesh_texture import level_of_detail, modulate_by_texture
 
@@ -185,7 +186,7 @@ def shade(n, shader, material, side, row, gradient, segment, lists, ints):
     """
     ambient, diffuse, specular, shininess, texture = material
     listed = n
-    n = (n + np.uint64(15)) & ~np.uint64(15)  # whole SIMD steps; what lies beyond the list does no harm
+    n = whole_steps(n)
     interpolate(n, segment, K0, KR, lists)
     interpolate(n, segment, K1, KG, lists)
     interpolate(n, segment, K2, KB, lists)

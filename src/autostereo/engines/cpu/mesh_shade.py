@@ -36,6 +36,12 @@ LIGHT_POINT = np.float32(1.0)
 
 
 @inlined
+def whole_steps(n):
+    """A count rounded up to whole SIMD steps: what lies beyond it does no harm, a remainder would be slow."""
+    return (n + np.uint64(15)) & ~np.uint64(15)
+
+
+@inlined
 def quantize(value):
     """⌊255·v + ½⌋ of a value clamped to 0…1."""
     return np.int32(min(max(value, ZERO), ONE) * BYTE + HALF)

@@ -28,6 +28,7 @@ from .mesh_shade import (
     U,
     X,
     Z,
+    whole_steps,
 )
 from .samples import COLOR_MASK, DEPTH_SHIFT, clear_samples, hit, nearer, plain_color, word
 
@@ -42,16 +43,17 @@ def find_runs(views, first_view, ends, block, offsets, lists, ints):
     """
     x1, p1, x2, p2 = ends
     low, high, sample_x, row, stride = block
-    longest = np.int32(0)
-    for v in range(views):
+    lanes = whole_steps(views)
+    for v in range(lanes):
         offset = offsets[first_view + v]
         start = min(max(np.ceil(x1 + offset * p1 - sample_x), low), high)
         end = min(max(np.ceil(x2 + offset * p2 - sample_x), low), high)
         lists[START + v] = start
         lists[RUN + v] = end - start
-    for v in range(views):
-        ints[BASE + v] = row + np.int32(v) * stride + np.int32(lists[START + v] - low)
-    for v in range(views):
+    for v in range(lanes):  # in 32 bits: SIMD has no quick product of 64
+        ints[BASE + v] = np.int32(np.int32(np.int32(v) * stride) + np.int32(row + np.int32(lists[START + v] - low)))
+    longest = np.int32(0)
+    for v in range(lanes):
         longest = max(longest, np.int32(lists[RUN + v]))
     return longest
 
@@ -61,7 +63,7 @@ def make_words(views, first_view, k, sample_x, ends, depths, color, offsets, lis
     """The k-th covered sample of each view, with its interpolated colour; 0 beyond a view's run."""
     step = np.float32(k)
     at = step + sample_x
-    for v in range(views):
+    for v in range(whole_steps(views)):
         _, z, u = hit(lists[START + v] + at, offsets[first_view + v], ends, depths)
         words[np.uint64(2) * v] = plain_color(u, color)
         words[np.uint64(2) * v + np.uint64(1)] = np.float32(z if step < lists[RUN + v] else ZERO).view(np.int32)
@@ -100,16 +102,21 @@ def test_lanes(views, first_view, k, sample_x, ends, depths, offsets, lists):
     """Inverse depth (0 beyond a view's run) and perspective parameter of the k-th covered sample of each view."""
     step = np.float32(k)
     at = step + sample_x
-    for v in range(views):
+    for v in range(whole_steps(views)):
         _, z, u = hit(lists[START + v] + at, offsets[first_view + v], ends, depths)
         lists[LANE_U + v] = u
         lists[LANE_Z + v] = z if step < lists[RUN + v] else ZERO
 
 
 class Place(NamedTuple):
-    """What draw_segment reads of a block: offsets (V,) float32, columns (first, end), sample_x, width of the picture."""
+    """What draw_segment reads of a block.
+
+    offsets (V + 15,) float32, the last one repeated, so that SIMD works in whole steps; number of views; columns
+    first … end; sample_x; width of the picture.
+    """
 
     offsets: np.ndarray
+    views: int
     first: int
     end: int
     sample_x: np.float32
@@ -124,14 +131,14 @@ def draw_segment(place, row, ends, depths, plain, shader, shading, scratch):
     colors, spans, counts = scratch.colors, scratch.spans, scratch.counts
     low, high = np.float32(place.first), np.float32(place.end)
     stride = np.int32(place.end - place.first)
-    base = np.int32(row) * stride * np.int32(offsets.shape[0])
+    base = np.int32(row) * stride * np.int32(place.views)
     color = (segment[0], segment[1], segment[2], segment[16], segment[17], segment[18])
     if shader.exact.shape[0] > 0 and not plain:
         shade_exact(ends, depths, sample_x, place.width, shader, shading, segment, lists, ints, colors, spans)
     n = np.uint64(0)
-    for first in range(0, offsets.shape[0], VIEWS_AT_ONCE):
+    for first in range(0, place.views, VIEWS_AT_ONCE):
         first_view = np.uint64(first)
-        views = np.uint64(min(VIEWS_AT_ONCE, offsets.shape[0] - first))
+        views = np.uint64(min(VIEWS_AT_ONCE, place.views - first))
         here = (low, high, sample_x, base + np.int32(first) * stride, stride)
         longest = find_runs(views, first_view, ends, here, offsets, lists, ints)
         for k in range(longest):
@@ -227,7 +234,7 @@ def draw_views(bins, surface, camera, shader, offsets, background, side, scratch
         for s in range(side * side):
             clear_samples(count, background, scratch.band)
             sample = ((s % side + 0.5) / side, (s // side + 0.5) / side)
-            place = Place(offsets, columns[0], columns[1], np.float32(sample[0]), np.float32(width))
+            place = Place(offsets, views, columns[0], columns[1], np.float32(sample[0]), np.float32(width))
             draw_block(draw_segment, place, rows, k, surface, camera, shader, sample, scratch)
             if side > 1:
                 add_samples(count, scratch.band, scratch.sums)

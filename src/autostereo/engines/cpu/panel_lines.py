@@ -29,7 +29,8 @@ class LinePlan(NamedTuple):
 
     map: its view map; offsets (V,) float64; period in pixels, a multiple of that of the table or the cells; step:
     phase from sample to sample, in (−½, ½], 0 for a table; first, slope: offset ≈ first + slope·phase, at most
-    `misfit` away; low, high: least and greatest offset of all; reach: length of the longest line in pixels.
+    `misfit` away; low, high: least and greatest offset of all; reach: length of the longest line in pixels; spacing, middle: offsets are
+    (k − middle)·spacing to the bit, or spacing is 0.
     """
 
     map: MapArgs
@@ -42,6 +43,8 @@ class LinePlan(NamedTuple):
     low: float
     high: float
     reach: float
+    spacing: float
+    middle: float
 
 
 def plan_lines(viewmap: ViewMap, width: int, flip: bool, offsets: NDArray[np.float64]) -> LinePlan:
@@ -50,7 +53,7 @@ def plan_lines(viewmap: ViewMap, width: int, flip: bool, offsets: NDArray[np.flo
     m = map_args(viewmap)
     if viewmap.table is not None:
         period = viewmap.table.shape[1]
-        return LinePlan(m, offsets, period, 0.0, 0.0, 0.0, 0.0, offsets.min(), offsets.max(), float(width))
+        return LinePlan(m, offsets, period, 0.0, 0.0, 0.0, 0.0, offsets.min(), offsets.max(), float(width), 0.0, 0.0)
     cells = 2 if viewmap.cell_mode in (1, 2, 3) else 1
     periods = np.arange(cells, MAX_PERIOD + 1, cells)
     steps = (-viewmap.a if flip else viewmap.a) * periods
@@ -59,7 +62,17 @@ def plan_lines(viewmap: ViewMap, width: int, flip: bool, offsets: NDArray[np.flo
     period, step = int(periods[best]), float(steps[best])
     first, slope, misfit, low, high = _fit(viewmap, offsets)
     reach = min(float(width), period / max(abs(step), 1e-9)) + period
-    return LinePlan(m, offsets, period, step, first, slope, misfit, low, high, reach)
+    spacing, middle = _even(offsets)
+    return LinePlan(m, offsets, period, step, first, slope, misfit, low, high, reach, spacing, middle)
+
+
+def _even(offsets: NDArray[np.float64]) -> tuple[float, float]:
+    """Spacing and middle of evenly spaced offsets, so that they need not be looked up; (0, 0) if they are not."""
+    middle = 0.5 * (len(offsets) - 1)
+    spacing = float(offsets[-1] - offsets[0]) / max(len(offsets) - 1, 1)
+    even = (np.arange(len(offsets)) - middle) * spacing
+    same = np.array_equal(even.astype(np.float32), offsets.astype(np.float32))
+    return (spacing, middle) if same else (0.0, 0.0)
 
 
 def _fit(viewmap: ViewMap, offsets: NDArray[np.float64]) -> tuple[float, float, float, float, float]:
@@ -103,7 +116,7 @@ def row_offsets(row, width, flip, columns, base, x0, plane, plan, u, out):
     a, b, views, reverse = m.a, m.b, np.float64(m.views), m.reverse
     count = np.uint64(columns[1] - columns[0])
     turn, sign = (width - 1 - columns[0], -1) if flip else (columns[0], 1)
-    last = offsets.shape[0] - 1
+    last, spacing, middle = offsets.shape[0] - 1, plan.spacing, plan.middle
     br = b * np.float64(row)
     for c in range(3):
         begin = np.uint64(base + c * plane + columns[0] - x0)
@@ -122,7 +135,13 @@ def row_offsets(row, width, flip, columns, base, x0, plane, plan, u, out):
             phi = t - np.floor(t)
             phi = 1.0 - phi if reverse else phi
             u[i] = (phi if phi < 1.0 else 0.0) * views
-        if m.continuous:
+        if spacing != 0.0 and m.continuous:
+            for i in range(count):
+                out[begin + i] = np.float32(((u[i] - 0.5) - middle) * spacing)
+        elif spacing != 0.0:
+            for i in range(count):
+                out[begin + i] = np.float32((min(np.floor(u[i]), views - 1.0) - middle) * spacing)
+        elif m.continuous:
             top, following = np.float64(max(last - 1, 0)), np.int64(min(last, 1))
             for i in range(count):
                 at = u[i] - 0.5
