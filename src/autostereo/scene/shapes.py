@@ -34,6 +34,13 @@ def displaced_sphere(subdivisions: int = 6, radius: float = 1.0, amplitude: floa
     """
     direction, faces = _icosahedron(_count("subdivisions", subdivisions, 0, 10))
     amplitude = check_number("amplitude", amplitude, 0.0, 0.9)
+    height, colors = hills(direction)
+    points = direction * (_length("radius", radius) * (1.0 + amplitude * height))[:, None]
+    return Mesh(points, faces, colors=colors)
+
+
+def hills(direction: Floats) -> tuple[Floats, Floats]:
+    """Height (N,) of the displaced sphere, about −1…1, and its colours (N, 3) in `direction` (N, 3), unit vectors."""
     x, y, z = direction.T
     height = (
         0.56 * np.sin(5.0 * x + 1.0) * np.cos(4.0 * y) * np.cos(3.0 * z)
@@ -42,8 +49,7 @@ def displaced_sphere(subdivisions: int = 6, radius: float = 1.0, amplitude: floa
     )
     phase = np.array([0.0, 2.1, 4.2])
     colors = 0.5 + 0.35 * np.cos(2.5 * (x + y - z)[:, None] + phase) + 0.15 * height[:, None]
-    points = direction * (_length("radius", radius) * (1.0 + amplitude * height))[:, None]
-    return Mesh(points, faces, colors=np.clip(colors, 0.0, 1.0))
+    return height, np.clip(colors, 0.0, 1.0)
 
 
 def uv_sphere(columns: int = 64, rows: int = 32, radius: float = 1.0) -> Mesh:
