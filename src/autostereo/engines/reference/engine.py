@@ -3,35 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import UnsupportedError
-from ...scene.appearance import Light
 from ...scene.mesh import Mesh
+from ...scene.points import Points
 from ...scene.scene import Scene
+from ...scene.volume import Volume
 from ...viewmap import offset_at
 from ..engine import Camera, Draw, Target
-from ..options import Options
 from . import gather
-from .mesh import Hits, Samples, Surface, trace
-from .shading import lights_in_eye_space, shade
+from .mesh import Samples, Surface
+from .picture import PreparedScene, mean_color, picture
+from .picture import visible_hits as visible_hits
+from .points import Surfels
+from .volume import Field
 
 Array = NDArray[np.float64]
 
-PREPARE: dict[type, Callable[[Any], Surface]] = {Mesh: Surface.of}
-
-
-@dataclass(frozen=True, eq=False)
-class PreparedScene:
-    """A scene in world space, ready to be traced."""
-
-    surfaces: list[Surface]
-    lights: tuple[Light, ...] | None
-    background: NDArray[np.uint8]
+PREPARE: dict[type, Callable[[Any], Any]] = {Mesh: Surface.of, Points: Surfels.of, Volume: Field.of}
 
 
 class ReferenceEngine:
@@ -52,8 +45,10 @@ class ReferenceEngine:
             if type(item) not in PREPARE:
                 names = ", ".join(kind.__name__ for kind in PREPARE)
                 raise UnsupportedError(f"engine reference draws {names}, the scene holds a {type(item).__name__}")
-        surfaces = [PREPARE[type(item)](item) for item in scene.objects]
-        return PreparedScene(surfaces, scene.lights, quantize(np.append(scene.background, 0.0)))
+        made: dict[type, list[Any]] = {kind: [] for kind in PREPARE}
+        for item in scene.objects:
+            made[type(item)].append(PREPARE[type(item)](item))
+        return PreparedScene(made[Mesh], made[Points], made[Volume], scene.lights, np.array(scene.background))
 
     def draw(self, prepared: PreparedScene, draw: Draw, target: Target) -> None:
         """Fill `target`: view by view, or the panel's sub-pixels."""
@@ -71,7 +66,9 @@ class ReferenceEngine:
     def _draw_panel(self, prepared: PreparedScene, draw: Draw, target: Target) -> None:
         """Each sub-pixel shows its own channel of what its own camera sees."""
         samples = panel_samples(draw)
-        color, _, covered = picture(prepared, samples, draw.camera, draw.options)
+        color, _, covered = picture(
+            prepared, samples, draw.camera, draw.options, averaged=draw.options.alpha == "averaged"
+        )
         channels = np.stack([color[:, :, c, :, c] for c in range(3)], axis=2)  # (H, W, 3, n)
         target.color[flips(draw)] = mean_color(channels[..., None], axis=3)[..., 0]
         target.covered += covered
@@ -136,41 +133,3 @@ def panel_samples(draw: Draw) -> Samples:
     x = columns[None, :, None, None] + dx
     y = rows[:, None, None, None] + dy
     return Samples(*np.broadcast_arrays(x, y, v))
-
-
-def visible_hits(surfaces: list[Surface], camera: Camera, samples: Samples) -> Hits:
-    """What the samples see of surfaces in eye space; triangles are counted through all of them."""
-    corners = np.concatenate([s.vertices[s.faces] for s in surfaces])
-    sides = [np.full(len(s.faces), 0 if s.two_sided else -1 if s.mirrored else 1) for s in surfaces]
-    return trace(corners, np.concatenate(sides), camera, samples)
-
-
-def picture(
-    prepared: PreparedScene, samples: Samples, camera: Camera, options: Options
-) -> tuple[NDArray[np.uint8], NDArray[np.float32], int]:
-    """Colour (…, 4) and depth (…) of samples (…), and how many were covered."""
-    surfaces = [surface.in_eye_space(camera) for surface in prepared.surfaces]
-    lights = lights_in_eye_space(prepared.lights, camera)
-    hits = visible_hits(surfaces, camera, samples)
-    color = np.empty((*samples.x.shape, 4), dtype=np.uint8)
-    color[...] = prepared.background
-    depth = np.full(samples.x.shape, np.inf, dtype=np.float32)
-    depth[hits.where] = hits.depth
-    first = 0
-    for surface in surfaces:
-        mine = hits.on(first, first + len(surface.faces))
-        rgb = shade(surface, mine, samples, camera, lights, options)
-        color[mine.where] = quantize(np.column_stack([rgb, np.ones(len(rgb))]))
-        first += len(surface.faces)
-    return color, depth, len(hits.triangle)
-
-
-def quantize(values: Array) -> NDArray[np.uint8]:
-    """uint8 = ⌊255·v + ½⌋ of values clamped to 0…1."""
-    return np.floor(255.0 * np.clip(values, 0.0, 1.0) + 0.5).astype(np.uint8)
-
-
-def mean_color(samples: NDArray[np.uint8], axis: int) -> NDArray[np.uint8]:
-    """Mean of quantised samples over an axis, rounded half up."""
-    n = samples.shape[axis]
-    return ((samples.sum(axis=axis, dtype=np.int64) + n // 2) // n).astype(np.uint8)

@@ -40,7 +40,8 @@ def lights_in_eye_space(lights: tuple[Light, ...] | None, camera: Camera) -> lis
 
 
 def illuminate(
-    points: Array, normals: Array, eyes: Array, material: Material, lights: list[tuple[Array, Array]]
+    points: Array, normals: Array, eyes: Array, material: Material, lights: list[tuple[Array, Array]],
+    both_sides: bool = False,
 ) -> tuple[Array, Array]:
     """What multiplies the surface's own colour, and the highlight added to it; each (M, 3), not clamped.
 
@@ -53,6 +54,8 @@ def illuminate(
         Surface points, unit normals on the side that is seen, and the eyes that see them.
     material : Material
     lights : list of (homogeneous position (4,), colour (3,))
+    both_sides : bool
+        |N·L| and |N·H| instead, for volumes: there is no outside.
     """
     view = unit(eyes - points)
     reflected = np.full(points.shape, material.ambient)
@@ -60,8 +63,10 @@ def illuminate(
     for position, color in lights:
         towards = unit(position[:3] - position[3] * points)
         cosine = np.sum(normals * towards, axis=1)
-        half = unit(towards + view)
-        gloss = np.maximum(np.sum(normals * half, axis=1), 0.0) ** material.shininess
+        half = np.sum(normals * unit(towards + view), axis=1)
+        if both_sides:
+            cosine, half = np.abs(cosine), np.abs(half)
+        gloss = np.maximum(half, 0.0) ** material.shininess
         reflected += material.diffuse * np.maximum(cosine, 0.0)[:, None] * color
         highlight += material.specular * np.where(cosine > 0, gloss, 0.0)[:, None] * color
     return reflected, highlight
