@@ -23,8 +23,8 @@ Floats = NDArray[np.floating]
 def hydrogen_orbital(size: int = 128, n: int = 4, l: int = 2, m: int = 0) -> Volume:  # noqa: E741
     """Probability density |ψ|² of the electron of a hydrogen atom, per cubic scene unit; its integral is 1.
 
-    The real orbital (n, l, ±m), whose axis is y: cos(mφ) for m > 0, sin(|m|φ) for m < 0. The cube holds 99.9 % of the
-    probability along every radius (Griffiths, Introduction to Quantum Mechanics, 2nd ed., equation 4.89).
+    The real orbital (n, l, ±m), whose axis is y: cos(mφ) for m > 0, sin(|m|φ) for m < 0. The sphere in the cube
+    holds 99.5 % of the probability (Griffiths, Introduction to Quantum Mechanics, 2nd ed., equation 4.89).
 
     Parameters
     ----------
@@ -64,16 +64,17 @@ def c60_density(size: int = 128) -> Volume:
     chemistry. The greatest value, close to 65535, is at the atoms.
     """
     size = _count("size", size, 16, 1024)
-    atoms = 0.74 * c60_atoms()
-    width = 0.28 * 0.74 * 4 / np.sqrt(58 + 18 * np.sqrt(5))  # 0.28 edges
+    atoms = 0.8 * c60_atoms()
+    width = 0.36 * 0.8 * 4 / np.sqrt(58 + 18 * np.sqrt(5))  # 0.36 edges: maxima stay apart, bonds show
     axis = np.linspace(-1.0, 1.0, size)
     x, y, z = (np.exp(-0.5 * ((axis - atoms[:, a, None]) / width) ** 2).astype(np.float32) for a in range(3))
     plane = (y[:, :, None] * x[:, None, :]).reshape(len(atoms), -1)
     density = (z.T @ plane).reshape(size, size, size)
     own = np.exp(-0.5 * np.square(atoms[:, None] - atoms).sum(axis=2) / width**2)[0].sum()  # at an atom
     values = np.minimum(density * np.float32(65535 / own) + np.float32(0.5), 65535).astype(np.uint16)
-    steps = [(0.0, 0.1, 0.2, 0.6, 0.0), (0.08, 0.15, 0.35, 0.85, 0.0), (0.2, 0.2, 0.55, 0.95, 2.5)]
-    steps += [(0.35, 0.4, 0.8, 0.75, 2.5), (0.55, 0.95, 0.75, 0.25, 9.0), (1.0, 1.0, 0.35, 0.2, 60.0)]
+    steps = [(0.0, 0.1, 0.2, 0.6, 0.0), (0.08, 0.1, 0.25, 0.75, 0.0), (0.2, 0.15, 0.45, 0.9, 2.0)]
+    steps += [(0.35, 0.2, 0.6, 0.85, 0.5), (0.6, 0.3, 0.8, 0.6, 4.0), (0.75, 0.95, 0.8, 0.3, 30.0)]
+    steps += [(1.0, 1.0, 0.35, 0.2, 60.0)]
     return _cube(values, _transfer(steps, 65535.0), Material(specular=0.3, shininess=30.0))
 
 
@@ -113,7 +114,7 @@ def engine_part(size: int = 128) -> Volume:
     bolt = np.hypot(np.abs(np.abs(x) - 0.585) - 0.285, np.abs(z) - 0.45)
     for hole in (bore, jacket, tunnel, channel, np.maximum(bolt - 0.035, y + 0.5)):
         metal = np.maximum(metal, -hole)
-    liner = np.maximum(np.abs(radial - 0.245) - 0.022, np.abs(y - 0.12) - 0.36)
+    liner = np.maximum(np.abs(radial - 0.235) - 0.035, np.abs(y - 0.12) - 0.36)
     shaft = np.maximum(np.hypot(y + 0.42, z) - 0.09, np.abs(x) - 0.95)
     head = np.maximum(bolt - 0.06, np.abs(y + 0.5) - 0.03)
     screw = np.minimum(np.maximum(bolt - 0.03, np.abs(y + 0.6) - 0.13), head)
@@ -123,8 +124,9 @@ def engine_part(size: int = 128) -> Volume:
     values = 215.0 * part_steel + 110.0 * np.minimum(_filled(metal, step), 1.0 - part_steel)
     values += 4.0 + 2.5 * np.random.default_rng(60).standard_normal(values.shape, dtype=np.float32)
     values = np.clip(values + 0.5, 0.0, 255.0).astype(np.uint8)
-    stops = [(0.0, 0.5, 0.55, 0.6, 0.0), (45.0, 0.5, 0.55, 0.6, 0.0), (80.0, 0.55, 0.6, 0.66, 3.0)]
-    stops += [(125.0, 0.62, 0.66, 0.7, 2.0), (155.0, 0.9, 0.6, 0.25, 6.0), (200.0, 1.0, 0.72, 0.3, 50.0)]
+    stops = [(0.0, 0.5, 0.55, 0.6, 0.0), (25.0, 0.5, 0.55, 0.6, 0.0), (60.0, 0.6, 0.66, 0.74, 12.0)]
+    stops += [(90.0, 0.6, 0.66, 0.74, 0.8), (130.0, 0.7, 0.6, 0.5, 0.8), (165.0, 0.95, 0.65, 0.25, 20.0)]
+    stops += [(200.0, 1.0, 0.74, 0.32, 60.0)]
     material = Material(specular=0.35, shininess=40.0)
     return Volume(values, (step,) * 3, origin, transfer=_transfer(stops), material=material)
 
@@ -203,10 +205,10 @@ def _transfer(points: Sequence[tuple[float, ...]], scale: float = 1.0) -> Transf
 
 
 def _orbital_radius(n: int, l: int) -> float:  # noqa: E741
-    """Radius in Bohr radii within which the electron is with a probability of 99.9 %."""
+    """Radius in Bohr radii within which the electron is with a probability of 99.5 %."""
     r = np.linspace(0.0, 4.0 * n * (n + 4), 20_001)
     inside = np.cumsum((_radial(n, l, r) * r) ** 2) * (r[1] - r[0])
-    return float(r[np.searchsorted(inside, 0.999)])
+    return float(r[np.searchsorted(inside, 0.995)])
 
 
 def _radial(n: int, l: int, r: NDArray) -> NDArray:  # noqa: E741
@@ -244,5 +246,5 @@ def _rounded(distance: Floats, radius: float) -> Floats:
 
 
 def _filled(distance: Floats, step: float) -> Floats:
-    """Share of a voxel that is inside, at a signed distance from the surface."""
-    return np.clip(0.5 - distance / np.float32(step), 0.0, 1.0)
+    """Share of a scanner's spot, 2 voxels wide, that is inside, at a signed distance from the surface."""
+    return np.clip(0.5 - distance / np.float32(2.0 * step), 0.0, 1.0)
