@@ -14,7 +14,7 @@ from ..errors import FileError
 PathLike = str | os.PathLike[str]
 
 
-def read_bytes(path: PathLike, asked_by: PathLike | None = None) -> bytes:
+def read_bytes(path: PathLike, asked_by: PathLike | None = None, limit: int = -1) -> bytes:
     """Return the contents of a file that is not empty and not a web page.
 
     Parameters
@@ -23,6 +23,8 @@ def read_bytes(path: PathLike, asked_by: PathLike | None = None) -> bytes:
         The file to read.
     asked_by : path, optional
         The file that refers to it; an error names it too.
+    limit : int
+        Read no more than these first bytes, ≥ 256; −1: all.
 
     Raises
     ------
@@ -34,7 +36,11 @@ def read_bytes(path: PathLike, asked_by: PathLike | None = None) -> bytes:
     try:
         if path.is_dir():
             raise FileError(f"{name} is a folder, expected a file" if asked_by else f"{path}: is a folder, not a file")
-        data = path.read_bytes()
+        if limit < 0:
+            data = path.read_bytes()
+        else:
+            with path.open("rb") as file:
+                data = file.read(limit)
     except FileNotFoundError:
         raise FileError(f"{name} does not exist" if asked_by else f"{path}: no such file") from None
     except PermissionError:

@@ -1,0 +1,217 @@
+"""Volumes from folders: a series of DICOM slices, or numbered pictures."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileError
+from ..scene.volume import Volume
+from .files import PathLike
+from .volume import NO_HINTS, Hints, check_start, clean, make_volume, silenced, simpleitk
+
+PICTURES = (".tif", ".tiff", ".png", ".bmp")
+EVEN = 0.05  # gaps between slices may differ by this part of the usual gap
+
+
+@dataclass(frozen=True)
+class _Slice:
+    """Where a slice lies: its file, first pixel (3,), axes (3, 2) along a row and a column, spacing and number."""
+
+    file: str
+    origin: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    spacing: tuple[float, float]
+    size: tuple[int, int]
+    instance: int
+
+    @property
+    def normal(self) -> NDArray[np.float64]:
+        return np.cross(self.axes[:, 0], self.axes[:, 1])
+
+
+def load_folder(path: PathLike, hints: Hints = NO_HINTS) -> list[Volume]:
+    """Read a folder: its DICOM series of most slices, else its TIFF, PNG or BMP pictures in the order of their numbers.
+
+    Slices of DICOM are sorted along their normal; the world frame is LPS (see io/volume.py). Slices that share
+    positions (a sequence in time, or several echoes) are frames, in the order of their instance numbers. A warning
+    says which series is read where there are several.
+
+    Raises
+    ------
+    DependencyError
+        SimpleITK is not installed.
+    FileError
+        There is no series; slices are missing, of different orientation, spacing or size, or cannot be read.
+    """
+    path = Path(path)
+    if not any(path.iterdir()):
+        raise FileError(f"{path}: is a folder, an empty one")
+    sitk = simpleitk(path)
+    with silenced(sitk):
+        find = sitk.ImageSeriesReader
+        series = {name: find.GetGDCMSeriesFileNames(str(path), name) for name in find.GetGDCMSeriesIDs(str(path))}
+    if not series:
+        return [_load_pictures(path, hints)]
+    longest = max(series.values(), key=len)
+    if len(series) > 1:
+        counts = ", ".join(str(len(files)) for files in sorted(series.values(), key=len, reverse=True))
+        warnings.warn(f"{path}: holds {len(series)} series of {counts} slices; the longest is read", stacklevel=2)
+    return [_load_series(sitk, path, list(longest), hints)]
+
+
+def load_dicom(path: PathLike, hints: Hints = NO_HINTS) -> list[Volume]:
+    """Read one DICOM file that holds several slices (enhanced CT or MR)."""
+    check_start(path)
+    sitk = simpleitk(path)
+    return [_load_multiframe(sitk, Path(path), str(path), hints)]
+
+
+def _load_series(sitk: Any, path: Path, files: list[str], hints: Hints) -> Volume:
+    with silenced(sitk):
+        slices = [_locate(sitk, file) for file in files]
+    if len(slices) == 1:
+        return _load_multiframe(sitk, path, files[0], hints)
+    first = slices[0]
+    for other in slices:
+        if other.size != first.size:
+            raise FileError(
+                f"{path}: slices differ in size: {_times(first.size)} in {Path(first.file).name}, "
+                f"{_times(other.size)} in {Path(other.file).name}"
+            )
+        if np.abs(other.axes - first.axes).max() > 1e-3:
+            raise FileError(
+                f"{path}: mixed orientations: {Path(first.file).name} and {Path(other.file).name} are not parallel"
+            )
+        if not np.allclose(other.spacing, first.spacing, rtol=1e-3):
+            raise FileError(
+                f"{path}: slices differ in spacing: {first.spacing} in {Path(first.file).name}, "
+                f"{other.spacing} in {Path(other.file).name}"
+            )
+    frames = _sort(slices, path)
+    chosen = frames[hints.choose(len(frames), path)]
+    step = (chosen[-1].origin - chosen[0].origin) / (len(chosen) - 1)
+    gap = float(np.linalg.norm(step))
+    values = _read_slices(sitk, path, chosen)
+    direction = np.column_stack([first.axes, step / gap])  # of a tilted gantry the third is not the normal
+    return make_volume(values, hints, (*first.spacing, gap), origin=chosen[0].origin, direction=direction)
+
+
+def _locate(sitk: Any, file: str) -> _Slice:
+    """Read the header of a slice."""
+    reader = sitk.ImageFileReader()
+    reader.SetFileName(file)
+    reader.SetImageIO("GDCMImageIO")
+    try:
+        reader.ReadImageInformation()
+    except RuntimeError as error:
+        raise FileError(f"{file}: is damaged or truncated ({clean(error)})") from None
+    direction = np.reshape(reader.GetDirection(), (reader.GetDimension(), -1))[:3, :2]
+    instance = reader.GetMetaData("0020|0013").strip() if reader.HasMetaDataKey("0020|0013") else ""
+    size, spacing = reader.GetSize(), reader.GetSpacing()
+    return _Slice(
+        file,
+        np.array(reader.GetOrigin()[:3]),
+        direction,
+        (spacing[0], spacing[1]),
+        (size[0], size[1]),
+        int(instance) if re.fullmatch(r"[+-]?\d+", instance) else 0,
+    )
+
+
+def _sort(slices: list[_Slice], path: Path) -> list[list[_Slice]]:
+    """Frames of slices in ascending position along the normal; gaps must be even."""
+    along = np.array([item.origin @ slices[0].normal for item in slices])
+    order = np.lexsort((np.array([item.instance for item in slices]), along))
+    sorted_along = along[order]
+    new = np.concatenate([[True], np.diff(sorted_along) > 1e-3 * min(slices[0].spacing)])
+    position = sorted_along[new]
+    counts = np.diff(np.append(np.nonzero(new)[0], len(slices)))
+    if len(position) == 1:
+        raise FileError(f"{path}: its {len(slices)} slices all lie at one position")
+    if (counts != counts[0]).any():
+        raise FileError(
+            f"{path}: slices are missing: {counts.max()} share a position, but only {counts.min()} "
+            f"at {position[counts.argmin()]:g} along the normal"
+        )
+    gaps = np.diff(position)
+    usual = float(np.median(gaps))
+    uneven = np.nonzero(np.abs(gaps - usual) > EVEN * usual)[0]
+    if len(uneven):
+        k = uneven[np.argmax(gaps[uneven])]
+        raise FileError(
+            f"{path}: slices are missing: after {position[k]:g} along the normal the next one is {gaps[k]:g} away, "
+            f"usual are {usual:g}"
+        )
+    table = order.reshape(len(position), -1)
+    return [[slices[k] for k in column] for column in table.T]
+
+
+def _read_slices(sitk: Any, path: Path, slices: list[_Slice]) -> NDArray:
+    """Values (nz, ny, nx) of slices of one size, each rescaled as its own header says."""
+    planes = []
+    for item in slices:
+        try:
+            with silenced(sitk):
+                plane = sitk.GetArrayFromImage(sitk.ReadImage(item.file, imageIO="GDCMImageIO"))
+        except RuntimeError as error:
+            raise FileError(f"{item.file}: is damaged or truncated ({clean(error)})") from None
+        plane = plane[0] if plane.ndim > 2 and len(plane) == 1 else plane
+        if plane.shape != item.size[::-1]:
+            raise FileError(f"{item.file}: expected one number a pixel of one slice, found an array {plane.shape}")
+        planes.append(plane.astype(np.float32) if plane.dtype == np.float64 else plane)
+    return np.stack(planes)
+
+
+def _load_multiframe(sitk: Any, path: Path, file: str, hints: Hints) -> Volume:
+    try:
+        with silenced(sitk):
+            image = sitk.ReadImage(file, imageIO="GDCMImageIO")
+    except RuntimeError as error:
+        raise FileError(f"{file}: is not DICOM, damaged or truncated ({clean(error)})") from None
+    if image.GetNumberOfComponentsPerPixel() != 1:
+        raise FileError(f"{file}: holds colours, expected one number a voxel")
+    if image.GetDimension() != 3 or image.GetDepth() < 2:
+        more = "expected a series" if path.is_dir() else "give the folder of its series"
+        raise FileError(f"{path}: is one DICOM slice, {more}")
+    hints.choose(1, path)
+    direction = np.reshape(image.GetDirection(), (3, 3))
+    values = sitk.GetArrayFromImage(image)
+    return make_volume(values, hints, image.GetSpacing(), origin=image.GetOrigin(), direction=direction)
+
+
+def _load_pictures(path: Path, hints: Hints) -> Volume:
+    """Read a folder of grey pictures: x along a row, y downwards in the picture, z from picture to picture."""
+    by_kind = {kind: [f for f in path.iterdir() if f.suffix.lower() == kind] for kind in PICTURES}
+    files = max(by_kind.values(), key=len)
+    if len(files) < 2:
+        raise FileError(f"{path}: is a folder without a DICOM series or a stack of pictures ({' '.join(PICTURES)})")
+    files.sort(key=lambda file: [int(p) if p.isdigit() else p for p in re.split(r"(\d+)", file.name.lower())])
+    import SimpleITK as sitk  # noqa: N813
+
+    planes = []
+    for file in files:
+        check_start(file)
+        try:
+            with silenced(sitk):
+                planes.append(sitk.GetArrayFromImage(sitk.ReadImage(str(file))))
+        except RuntimeError as error:
+            raise FileError(f"{file}: cannot be read ({clean(error)})") from None
+        if planes[-1].ndim != 2:
+            raise FileError(f"{file}: expected a grey picture, found an array {planes[-1].shape}")
+        if planes[-1].shape != planes[0].shape:
+            raise FileError(
+                f"{file}: is {_times(planes[-1].shape[::-1])}, but {files[0].name} {_times(planes[0].shape[::-1])}"
+            )
+    hints.choose(1, path)
+    return make_volume(np.stack(planes), hints)
+
+
+def _times(size: tuple[int, ...]) -> str:
+    return "×".join(map(str, size))
