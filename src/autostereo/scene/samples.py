@@ -81,8 +81,8 @@ def c60_density(size: int = 128) -> Volume:
 def c60_atoms() -> NDArray[np.float64]:
     """Corners (60, 3) of the truncated icosahedron whose corners are at distance 1 from the origin."""
     mesh = icosphere(0)
-    edge = np.unique(np.concatenate([mesh.faces, np.roll(mesh.faces, 1, axis=1)]).reshape(-1, 3)[:, :2], axis=0)
-    corners = (2.0 * mesh.vertices[edge[:, 0]] + mesh.vertices[edge[:, 1]]) / 3.0
+    start, end = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()  # each edge once in either direction
+    corners = (2.0 * mesh.vertices[start] + mesh.vertices[end]) / 3.0
     return corners / np.linalg.norm(corners, axis=1, keepdims=True)
 
 
@@ -149,7 +149,7 @@ def shells(size: int = 128, count: int = 4) -> Volume:
     steps: list[tuple[float, ...]] = []
     for k in range(count):
         color = 0.55 + 0.45 * np.cos(2.0 * np.pi * (k / count + np.array((0.55, 0.22, -0.1))))
-        for share, opacity in ((0.1, 0.0), (0.5, 9.0), (0.9, 0.0)):
+        for share, opacity in ((0.1, 0.0), (0.5, 12.6), (0.9, 0.0)):
             steps.append((255.0 * (k + share) / count, *color.tolist(), opacity))
     values = (values * np.float32(255.0 / count) + np.float32(0.5)).astype(np.uint8)
     return _cube(values, _transfer(steps), Material(specular=0.2, shininess=32.0))
