@@ -43,7 +43,7 @@ class Picture:
     Attributes
     ----------
     color : ndarray of shape (M, 3), float64
-        Light of the opaque things, 0…1, then of all.
+        Light that is seen; that of opaque things is clamped to 0…1.
     through : ndarray of shape (M,), float64
         Share of the background that is seen.
     opaque, half : ndarray of shape (M,), float64
@@ -57,6 +57,11 @@ class Picture:
         self.color = np.zeros((len(self.rays), 3))
         self.through = np.ones(len(self.rays))
         self.opaque, self.half = np.full((2, len(self.rays)), np.inf)
+
+    @property
+    def depth(self) -> Array:
+        """Depth (M,) of what is nearest to be seen."""
+        return np.minimum(self.opaque, self.half)
 
     def put(self, where: NDArray[np.integer], depth: Array, color: Array) -> None:
         """Show opaque things at those of the samples `where` (K,) at which they are the nearest so far."""
@@ -126,10 +131,10 @@ def visible_hits(surfaces: list[Surface], camera: Camera, samples: Samples) -> H
     return trace(corners, np.concatenate(sides), camera, samples)
 
 
-def picture(
+def look(
     prepared: PreparedScene, samples: Samples, camera: Camera, options: Options, averaged: bool = False
-) -> tuple[NDArray[np.uint8], NDArray[np.float32], int]:
-    """Colour (…, 4) and depth (…) of samples (…), and how many were covered."""
+) -> Picture:
+    """What samples see of the whole scene; `averaged` as in `Picture.add_volumes`."""
     result = Picture(prepared, samples, camera, options)
     fields = [field.in_eye_space(camera) for field in prepared.fields]
     depths = volume.planes(fields, camera, options.step) if fields else np.empty(0)
@@ -145,10 +150,18 @@ def picture(
         result.add_volumes(composites, depths, averaged)
     for field in maxima:
         result.add_maximum(field, depths)
-    rgb = result.color + result.through[:, None] * prepared.background
-    color = quantize(np.column_stack([rgb, 1 - result.through])).reshape(*samples.x.shape, 4)
-    depth = np.minimum(result.opaque, result.half).astype(np.float32).reshape(samples.x.shape)
-    return color, depth, int(np.count_nonzero(result.through < 1))
+    result.color += result.through[:, None] * prepared.background
+    return result
+
+
+def picture(
+    prepared: PreparedScene, samples: Samples, camera: Camera, options: Options, averaged: bool = False
+) -> tuple[NDArray[np.uint8], NDArray[np.float32], int]:
+    """Colour (…, 4) and depth (…) of samples (…), and how many were covered."""
+    seen = look(prepared, samples, camera, options, averaged)
+    color = quantize(np.column_stack([seen.color, 1 - seen.through])).reshape(*samples.x.shape, 4)
+    depth = seen.depth.astype(np.float32).reshape(samples.x.shape)
+    return color, depth, int(np.count_nonzero(seen.through < 1))
 
 
 def quantize(values: Array) -> NDArray[np.uint8]:
