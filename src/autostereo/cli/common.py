@@ -9,8 +9,9 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from ..display.display import Display
     from ..display.rig import Rig
     from ..scene.scene import Scene
+    from ..scene.volume import Volume
 
 MAX_SIDE = 32_768  # what a Display takes
 MAX_VIEWS = 4_096
@@ -43,7 +45,9 @@ def _set_quiet(value: bool) -> bool:
 
 
 # --- options, in the words of the help -----------------------------------------------------------------------------
-Inputs = Annotated[list[Path], typer.Argument(metavar="IN...", help="Scene files; several are merged.")]
+Inputs = Annotated[
+    list[Path], typer.Argument(metavar="IN...", help="Scene files, or folders of slices; several are merged.")
+]
 Output = Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="Output file.")]
 DisplayName = Annotated[
     str, typer.Option("--display", "-d", metavar="NAME", help="Preset name, visual.json, or your own .toml.")
@@ -69,6 +73,20 @@ Shading = Annotated[str, typer.Option("--shading", help="exact, center or reuse.
 Lighting = Annotated[str, typer.Option("--lighting", help="sample or vertex.")]
 Sampling = Annotated[str, typer.Option("--sampling", help="pixel or subpixel.")]
 Samples = Annotated[int, typer.Option("--samples", help="Samples per pixel: 1, 4, 16 or 64.")]
+Shape = Annotated[str | None, typer.Option("--shape", metavar="XxYxZ", help="Voxels of a .raw file.")]
+VoxelType = Annotated[
+    str | None, typer.Option("--dtype", metavar="TYPE", help="Type of its voxels: uint8 … float64, uint16be ….")
+]
+Frame = Annotated[int | None, typer.Option("--frame", metavar="N", help="Which volume of a 4-D file, from 0.")]
+Spacing = Annotated[
+    str | None, typer.Option("--spacing", metavar="X,Y,Z", help="Distance of voxels, instead of the file's.")
+]
+Transfer = Annotated[
+    str | None,
+    typer.Option("--transfer", metavar="NAME", help="Volumes: a .json, a preset such as ct-bone, or a colour map."),
+]
+Mode = Annotated[str | None, typer.Option("--mode", help="Volumes: composite, mip or iso.")]
+Iso = Annotated[float | None, typer.Option("--iso", metavar="VALUE", help="Volumes: the surface of this value.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", callback=_set_quiet, help="Say nothing but errors.")]
 
 
@@ -230,8 +248,6 @@ def load_display(
     name: str, size: str | None = None, swap: bool = False, views: int | None = None, continuous: bool = False
 ) -> Display:
     """Return the display called `name` (preset, visual.json or .toml) with the changes that the options ask for."""
-    from dataclasses import replace
-
     from ..display.display import Display
 
     check_views(views)
@@ -261,18 +277,73 @@ def load_camera(path: Path | None) -> Rig | None:
     return Rig.load(path)
 
 
-def load_scene(paths: list[Path], background: str | None) -> Scene:
-    """Read scene files into one scene."""
-    from dataclasses import replace
+def stem(path: Path) -> str:
+    """Return what the output is called after: the file's or the folder's name without .gz and suffix."""
+    path = path.resolve() if path.name in ("", ".", "..") else path
+    return path.name if path.is_dir() else Path(path.stem).stem if path.suffix.lower() == ".gz" else path.stem
 
+
+@dataclass(frozen=True)
+class VolumeOptions:
+    """The options of volumes, as typed."""
+
+    shape: str | None = None
+    dtype: str | None = None
+    frame: int | None = None
+    spacing: str | None = None
+    transfer: str | None = None
+    mode: str | None = None
+    iso: float | None = None
+
+    def hints(self) -> dict[str, Any]:
+        """What `load` wants to know."""
+        result: dict[str, Any] = {"dtype": self.dtype, "frame": self.frame}
+        if self.shape is not None:
+            parts = self.shape.lower().replace("×", "x").split("x")
+            if len(parts) != 3 or not all(part.isascii() and part.isdigit() for part in parts):
+                raise InputError(f"--shape: expected three whole numbers such as 256x256x128, got {self.shape!r}")
+            result["shape"] = tuple(int(part) for part in parts)
+        if self.spacing is not None:
+            result["spacing"] = parse_numbers(self.spacing, "--spacing", 3)
+        return result
+
+    def applied(self, scene: Scene) -> Scene:
+        """Return the scene with its volumes seen as the options ask for."""
+        if self.transfer is None and self.mode is None and self.iso is None:
+            return scene
+        from ..scene.transfer import TransferFunction
+        from ..scene.volume import Volume
+
+        if self.iso is not None and self.mode not in (None, "iso"):
+            raise InputError(f"--iso: needs --mode iso, got {self.mode}")
+        if not any(isinstance(item, Volume) for item in scene.objects):
+            raise InputError("--transfer, --mode and --iso: none of the inputs is a volume")
+        file = self.transfer is not None and self.transfer.lower().endswith(".json")
+        loaded = TransferFunction.load(self.transfer) if file else None  # type: ignore[arg-type]
+
+        def seen(volume: Volume) -> Volume:
+            changes: dict[str, Any] = {"mode": self.mode or ("composite" if self.iso is None else "iso")}
+            if self.iso is not None:
+                changes["iso"] = self.iso
+            if self.transfer is not None:
+                changes["transfer"] = loaded or TransferFunction.fitted(self.transfer, volume)
+            return replace(volume, **changes)
+
+        return replace(scene, objects=tuple(seen(x) if isinstance(x, Volume) else x for x in scene.objects))
+
+
+def load_scene(paths: list[Path], background: str | None, volumes: VolumeOptions | None = None) -> Scene:
+    """Read scene files into one scene."""
     color = parse_color(background) if background is not None else None
+    volumes = volumes or VolumeOptions()
+    hints = volumes.hints()
     for path in paths:
         if not path.exists():
             raise FileError(f"{path}: no such file")
     with working("reading"):
         from ..io import load
 
-        scene = load(*paths)
+        scene = volumes.applied(load(*paths, **hints))
     return scene if color is None else replace(scene, background=color)
 
 

@@ -37,6 +37,13 @@ def quilt(
     shading: common.Shading = "exact",
     lighting: common.Lighting = "sample",
     samples: common.Samples = 1,
+    shape: common.Shape = None,
+    dtype: common.VoxelType = None,
+    frame: common.Frame = None,
+    spacing: common.Spacing = None,
+    transfer: common.Transfer = None,
+    mode: common.Mode = None,
+    iso: common.Iso = None,
     quiet: common.Quiet = False,
 ) -> None:
     """Render a quilt: all views tiled into one picture.
@@ -47,17 +54,19 @@ def quilt(
     Examples:
       autostereo quilt bunny.ply --display looking-glass-portrait
       autostereo quilt bunny.ply --grid 8x6 --view-size 420x560 -o out.png
+      autostereo quilt scan/ -d looking-glass-portrait --transfer mr-brain
     """
     from ..engines.options import Options
 
     where = None if display is None else common.load_display(display)
     layout = choose_layout(where, grid, view_size, aspect)
     options = Options(shading=shading, lighting=lighting, samples=samples)
+    volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
     rig = common.load_camera(camera)
     from ..encoders.quilt import quilt_path
 
-    path = common.check_image(quilt_path(output or Path(f"{inputs[0].stem}.png"), layout))
-    scene = common.load_scene(inputs, background)
+    path = common.check_image(quilt_path(output or Path(f"{common.stem(inputs[0])}.png"), layout))
+    scene = common.load_scene(inputs, background, volumes)
     rig = _frame(scene, where, layout) if rig is None else rig.with_views(layout.views)
     if rig.aspect is None:
         rig = replace(rig, aspect=layout.aspect)

@@ -25,6 +25,13 @@ def render(
     lighting: common.Lighting = "sample",
     sampling: common.Sampling = "pixel",
     samples: common.Samples = 1,
+    shape: common.Shape = None,
+    dtype: common.VoxelType = None,
+    frame: common.Frame = None,
+    spacing: common.Spacing = None,
+    transfer: common.Transfer = None,
+    mode: common.Mode = None,
+    iso: common.Iso = None,
     quiet: common.Quiet = False,
 ) -> None:
     """Render scene files to the interlaced picture of a display.
@@ -37,14 +44,17 @@ def render(
       autostereo render room.glb lamp.glb -d visual.json -o room.png
       autostereo render bunny.ply -d alioscopy-8 --swap --background white --samples 4
       autostereo render bunny.ply -d my_panel.toml --size 3840x2160 --camera rig.json
+      autostereo render head.nii.gz -d looking-glass-portrait --transfer ct-bone
+      autostereo render engine.raw --shape 256x256x128 --dtype uint8 -d alioscopy-8 --iso 120
     """
     from ..engines.options import Options
 
     where = common.load_display(display, size, swap, views, continuous)
     options = Options(shading=shading, lighting=lighting, sampling=sampling, samples=samples)
+    volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
     rig = common.load_camera(camera)
-    path = common.check_image(output or Path(f"{inputs[0].stem}_{common.slug(display)}.png"))
-    scene = common.load_scene(inputs, background)
+    path = common.check_image(output or Path(f"{common.stem(inputs[0])}_{common.slug(display)}.png"))
+    scene = common.load_scene(inputs, background, volumes)
 
     from ..render import render as draw
 

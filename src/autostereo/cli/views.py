@@ -30,6 +30,13 @@ def views(
     lighting: common.Lighting = "sample",
     samples: common.Samples = 1,
     depth: Annotated[bool, typer.Option("--depth", help="Also keep eye depth (.npz only).")] = False,
+    shape: common.Shape = None,
+    dtype: common.VoxelType = None,
+    frame: common.Frame = None,
+    spacing: common.Spacing = None,
+    transfer: common.Transfer = None,
+    mode: common.Mode = None,
+    iso: common.Iso = None,
     quiet: common.Quiet = False,
 ) -> None:
     """Render the single views, from left to right.
@@ -41,9 +48,10 @@ def views(
       autostereo views bunny.ply -o bunny/ --views 8 --size 512x512
       autostereo views bunny.ply -o bunny.webp -d looking-glass-portrait --size 420x560
       autostereo views bunny.ply -o bunny.npz --depth --camera rig.json
+      autostereo views head.nrrd -o head.webp --mode mip
     """
     suffix = output.suffix.lower()
-    shape = common.parse_size(size) if size else (512, 512)
+    pixels = common.parse_size(size) if size else (512, 512)
     if suffix not in ("", ".npz", *ANIMATIONS):
         raise InputError(f"{output}: expected a folder, or a name ending in .npz {' '.join(ANIMATIONS)}, got {suffix}")
     if depth and suffix != ".npz":
@@ -52,18 +60,19 @@ def views(
 
     common.check_views(views)
     if suffix in ANIMATIONS:
-        check_animation(output, shape)
+        check_animation(output, pixels)
     options = Options(shading=shading, lighting=lighting, samples=samples, depth=depth)
+    volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
     rig = common.load_camera(camera)
     common.check_output(output, (suffix,) if suffix else ())
-    scene = common.load_scene(inputs, background)
-    rig = common.frame_views(scene, rig, views, shape, display)
+    scene = common.load_scene(inputs, background, volumes)
+    rig = common.frame_views(scene, rig, views, pixels, display)
 
     from ..render import render_views
 
     common.announce_compilation(engine, "draw_views")
     with common.working(f"rendering {rig.views} views"):
-        stack = render_views(scene, rig, shape, method=method, engine=engine, options=options)
+        stack = render_views(scene, rig, pixels, method=method, engine=engine, options=options)
     with common.working("writing", None):
         if suffix in ANIMATIONS:
             from ..encoders.video import save_animation
@@ -75,7 +84,7 @@ def views(
             with common.whole_folder(output, stale="view_*.png") as folder:
                 stack.save(folder)
                 rig.save(folder / "rig.json")
-    say(f"{output}  {rig.views} views of {shape[0]}×{shape[1]}")
+    say(f"{output}  {rig.views} views of {pixels[0]}×{pixels[1]}")
 
 
 def check_animation(path: Path, size: tuple[int, int]) -> None:

@@ -235,6 +235,16 @@ class TransferFunction:
         return TransferFunction(make_colormap(name, low, high, opacity))
 
     @staticmethod
+    def fitted(name: str, volume: Volume) -> TransferFunction:
+        """Return a preset or a colour map, fitted to a volume's range of values and the diagonal of its bounds.
+
+        Presets of CT keep their Hounsfield units where the volume seems to be in them (it holds values below −500).
+        """
+        from .transfer_presets import fit
+
+        return TransferFunction(fit(name, volume.value_range, volume.diagonal))
+
+    @staticmethod
     def suggest(volume: Volume | ArrayLike, diagonal: float | None = None) -> TransferFunction:
         """Return a transfer function that shows something of any data: neither empty nor opaque.
 

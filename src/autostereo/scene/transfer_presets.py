@@ -211,6 +211,25 @@ def make_colormap(name: str, low: float, high: float, opacity: float | Sequence[
     return np.stack([low + every * (high - low), *columns, np.interp(every, knots, given)], axis=1)
 
 
+def fit(name: str, value_range: tuple[float, float], diagonal: float) -> NDArray[np.float64]:
+    """Return the points (K, 5) of a preset or a colour map over a range of values in bounds of a diagonal."""
+    low, high = value_range
+    high = high if high > low else low + 1
+    if name in PRESETS:
+        hounsfield = PRESETS[name][0] == CT and low < -500
+        return make_preset(name, *((None, None) if hounsfield else (low, high)), 1 / diagonal)
+    try:
+        return make_colormap(name, low, high, 20 / diagonal)
+    except DependencyError:
+        more = "; all of matplotlib's: pip install autostereo[colormaps]"
+    except InputError:
+        more = " and all of matplotlib's"
+    raise InputError(
+        f"transfer {name!r}: expected a .json file, a preset ({', '.join(PRESETS)}) or a colour map "
+        f"({', '.join(sorted([*COLORMAPS, *CORNERS]))}{more})"
+    )
+
+
 def _stops(name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Positions (K,) in 0…1 and colours (K, 3) of a colour map."""
     reverse = isinstance(name, str) and name.endswith("_r")
