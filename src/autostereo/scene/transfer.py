@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+FAINT = 1e-280  # optical depths below this lose digits to underflow, and colour is no longer weighted by them
+
 
 def _check_points(points: ArrayLike) -> Array:
     """Return control points as a checked (K, 5) float64 array, or raise an error that names what is wrong."""
@@ -150,7 +152,7 @@ class TransferFunction:
         tail = _integrals(high[cut] - value[j], rows[:, j], at_high[:, cut])
         total[:, cut] = head + (self._cumulative[:, j] - self._cumulative[:, i]) + tail
         tau, length = total[0], high - low
-        point, dark = length == 0, tau <= 0
+        point, dark = length == 0, tau < FAINT
         color = np.where(dark, total[4:], total[1:4]) / np.where(dark, np.where(point, 1.0, length), tau)
         result = np.where(point, at_low, np.concatenate([color, tau[None] / np.where(point, 1.0, length)]))
         np.clip(result[:3], 0.0, 1.0, out=result[:3])

@@ -42,6 +42,8 @@ def _check_values(values: object) -> NDArray:
         if not fitting:
             raise InputError(f"values: {low}…{high} ({a.dtype}) do not fit into 16 bits; convert them to float32")
         a = a.astype(fitting[0])
+    if a.flags.c_contiguous and a.dtype.isnative:
+        return a
     return np.ascontiguousarray(a, dtype=a.dtype.newbyteorder("="))
 
 
