@@ -28,10 +28,14 @@ PREPARE: dict[type, Callable[[Any], Any]] = {Mesh: Surface.of, Points: Surfels.o
 
 
 class ReferenceEngine:
-    """Says what the right picture is. Every method draws the same samples, so its methods cannot differ."""
+    """Says what the right picture is. Single pass and n-pass draw the same samples, so they cannot differ.
+
+    Rays are always those of each sample's own eye: `Options.volume` makes no difference. `alpha="averaged"`, a limit
+    of 2007's hardware (Hübner 2007b, section 3.6), is drawn where it arose: in panels, in a single pass.
+    """
 
     name = "reference"
-    methods: tuple[str, ...] = ("single-pass", "n-pass")
+    methods: tuple[str, ...] = ("single-pass", "n-pass", "n-pass-subres")
 
     def prepare(self, scene: Scene) -> PreparedScene:
         """Bring all objects into world space.
