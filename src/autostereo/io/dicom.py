@@ -16,7 +16,7 @@ from ..scene.volume import Volume
 from .files import PathLike
 from .volume import NO_HINTS, Hints, check_start, clean, make_volume, silenced, simpleitk
 
-PICTURES = (".tif", ".tiff", ".png", ".bmp")
+PICTURES = (".tif", ".tiff", ".png")
 EVEN = 0.05  # gaps between slices may differ by this part of the usual gap
 
 
@@ -37,11 +37,11 @@ class _Slice:
 
 
 def load_folder(path: PathLike, hints: Hints = NO_HINTS) -> list[Volume]:
-    """Read a folder: its DICOM series of most slices, else its TIFF, PNG or BMP pictures in the order of their numbers.
+    """Read a folder: its DICOM series of most slices, else its TIFF or PNG pictures in the order of their numbers.
 
     Slices of DICOM are sorted along their normal; the world frame is LPS (see io/volume.py). Slices that share
     positions (a sequence in time, or several echoes) are frames, in the order of their instance numbers. A warning
-    says which series is read where there are several.
+    says so where there are several series, or files that are no slices or broken ones.
 
     Raises
     ------
@@ -63,6 +63,11 @@ def load_folder(path: PathLike, hints: Hints = NO_HINTS) -> list[Volume]:
     if len(series) > 1:
         counts = ", ".join(str(len(files)) for files in sorted(series.values(), key=len, reverse=True))
         warnings.warn(f"{path}: holds {len(series)} series of {counts} slices; the longest is read", stacklevel=2)
+    known = {Path(file).name for files in series.values() for file in files}
+    lost = sorted(file.name for file in path.iterdir() if file.name not in known and _is_dicom(file))
+    if lost:
+        more = f" and {len(lost) - 1} more are" if len(lost) > 1 else " is"
+        warnings.warn(f"{path}: {lost[0]}{more} left out: no picture, damaged or truncated", stacklevel=2)
     return [_load_series(sitk, path, list(longest), hints)]
 
 
@@ -71,6 +76,14 @@ def load_dicom(path: PathLike, hints: Hints = NO_HINTS) -> list[Volume]:
     check_start(path)
     sitk = simpleitk(path)
     return [_load_multiframe(sitk, Path(path), str(path), hints)]
+
+
+def _is_dicom(file: Path) -> bool:
+    """Whether a file says that it is DICOM; the table of contents of a disc does not count."""
+    if not file.is_file() or file.name.upper() == "DICOMDIR":
+        return False
+    with file.open("rb") as opened:
+        return opened.read(132)[128:] == b"DICM"
 
 
 def _load_series(sitk: Any, path: Path, files: list[str], hints: Hints) -> Volume:
@@ -141,7 +154,7 @@ def _sort(slices: list[_Slice], path: Path) -> list[list[_Slice]]:
             f"at {position[counts.argmin()]:g} along the normal"
         )
     gaps = np.diff(position)
-    usual = float(np.median(gaps))
+    usual = float(np.sort(gaps)[(len(gaps) - 1) // 2])
     uneven = np.nonzero(np.abs(gaps - usual) > EVEN * usual)[0]
     if len(uneven):
         k = uneven[np.argmax(gaps[uneven])]

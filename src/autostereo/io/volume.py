@@ -224,32 +224,46 @@ def _reason(path: Path, error: Exception) -> str:
 
 
 def _check_nifti(path: Path, reader: Any) -> None:
-    """Refuse a truncated NIfTI file: what ITK misses of one it takes for zeros."""
-    voxels = int(np.prod(reader.GetSize()))
-    wanted = int(float(reader.GetMetaData("vox_offset"))) + voxels * int(reader.GetMetaData("bitpix")) // 8
-    found = path.stat().st_size
-    if path.suffix.lower() == ".gz":
-        with open(path, "rb") as file:
-            file.seek(-4, os.SEEK_END)
-            found = int.from_bytes(file.read(), "little")  # gzip ends with the length of the data
-        if found < wanted % 2**32:  # truncated, or of several members
-            found = _unpacked_size(path)
-        elif wanted >= 2**32:
-            return
+    """Refuse a truncated NIfTI file and one with NaN: ITK takes what is missing or not finite for zeros."""
+    start = int(float(reader.GetMetaData("vox_offset")))
+    bits = int(reader.GetMetaData("bitpix"))
+    wanted = start + int(np.prod(reader.GetSize())) * bits // 8
+    floats = int(reader.GetMetaData("datatype")) in (16, 64)
+    if not floats and _size_told(path) == wanted % 2**32:
+        return
+    found, bad = _scan(path, start, f"f{bits // 8}" if floats else None)
     if found < wanted:
         raise FileError(f"{path}: truncated: {wanted:,} bytes expected, found {found:,}")
+    if bad:
+        raise FileError(f"{path}: expected finite numbers, found NaN or infinity in {bad:,} voxels")
 
 
-def _unpacked_size(path: Path) -> int:
-    """Bytes of a gzip file, as far as it can be unpacked."""
-    total = 0
+def _size_told(path: Path) -> int:
+    """Bytes of a file once unpacked, modulo 2³², as a gzip file of one member says at its end."""
+    if path.suffix.lower() != ".gz":
+        return path.stat().st_size % 2**32
+    with open(path, "rb") as file:
+        file.seek(-4, os.SEEK_END)
+        return int.from_bytes(file.read(), "little")
+
+
+def _scan(path: Path, start: int, kind: str | None) -> tuple[int, int]:
+    """Bytes of a NIfTI file, as far as it can be unpacked, and how many numbers from `start` on are not finite."""
+    size = bad = 0
     try:
-        with gzip.open(path) as file:
+        with gzip.open(path) if path.suffix.lower() == ".gz" else open(path, "rb") as file:
+            head = file.read(start)
+            size = len(head)
+            order = "<" if head[:1] in (b"\x5c", b"\x1c") else ">"  # the low byte of the header's size, 348 or 540
+            dtype = np.dtype(order + (kind or "u1"))
             while part := file.read(1 << 22):
-                total += len(part)
+                size += len(part)
+                if kind:
+                    numbers = np.frombuffer(part, dtype, len(part) // dtype.itemsize)
+                    bad += int(np.count_nonzero(~np.isfinite(numbers)))
     except (OSError, EOFError, zlib.error):
         pass
-    return total
+    return size, bad
 
 
 @contextmanager

@@ -214,10 +214,11 @@ def make_colormap(name: str, low: float, high: float, opacity: float | Sequence[
 def fit(name: str, value_range: tuple[float, float], diagonal: float) -> NDArray[np.float64]:
     """Return the points (K, 5) of a preset or a colour map over a range of values in bounds of a diagonal."""
     low, high = value_range
-    high = high if high > low else low + 1
+    high = high if high > low else low + max(1.0, abs(low))
     if name in PRESETS:
-        hounsfield = PRESETS[name][0] == CT and low < -500
-        return make_preset(name, *((None, None) if hounsfield else (low, high)), 1 / diagonal)
+        if PRESETS[name][0] == CT and low < -500:  # Hounsfield units
+            low, high = CT
+        return make_preset(name, low, high, 1 / diagonal)
     try:
         return make_colormap(name, low, high, 20 / diagonal)
     except DependencyError:
