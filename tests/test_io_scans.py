@@ -159,6 +159,31 @@ def test_bad_las(tmp_path, name):
     refused(write(tmp_path, f"c{name}", b"nothing"), "is not a LAS or LAZ file")
 
 
+@pytest.mark.parametrize(
+    ("name", "at", "value", "words"),
+    [
+        ("a.las", 100, 2**31, "variable length records do not fit"),
+        ("a.las", 107, 2**31, "cannot hold the 2147483648 points that are announced"),
+        ("a.laz", 107, 2**31, "cannot hold the 2147483648 points that are announced"),
+        ("a.laz", 96, 2**31, "truncated"),
+    ],
+)
+def test_las_headers_that_announce_too_much(tmp_path, name, at, value, words):
+    data = bytearray(las(tmp_path, name).read_bytes())
+    struct.pack_into("<I", data, at, value)
+    refused(write(tmp_path, f"b{name}", bytes(data)), words)
+
+
+def test_laz_with_a_damaged_table_of_chunks(tmp_path):
+    data = bytearray(las(tmp_path, "a.laz").read_bytes())
+    start = struct.unpack_from("<I", data, 96)[0]
+    table = struct.unpack_from("<q", data, start)[0]
+    struct.pack_into("<I", data, table + 4, 2**31)
+    refused(write(tmp_path, "b.laz", bytes(data)), "table of its compressed points is missing")
+    struct.pack_into("<q", data, start, 10**9)
+    refused(write(tmp_path, "c.laz", bytes(data)), "table of its compressed points is missing")
+
+
 def test_las_without_laspy_names_the_extra(tmp_path, monkeypatch):
     path = las(tmp_path)
     monkeypatch.setitem(sys.modules, "laspy", None)

@@ -98,8 +98,8 @@ def _rows(lines: list[bytes], separator: bytes | None, path: PathLike) -> NDArra
         text = text.replace(separator, b" ").replace(b'"', b"")
     words = text.split()
     if len(words) != width * len(lines):
-        empty = next(line for line in lines if not all(_fields(line, separator)))
-        raise FileError(f"{path}: a field is empty in {_shown(empty)}")
+        wrong = [line for line in lines if any(len(field.split()) != 1 for field in _fields(line, separator))]
+        raise FileError(f"{path}: expected one number in every field, found {_shown(wrong[0])}")
     return numbers(words, path, "points").reshape(len(lines), width)
 
 
