@@ -231,8 +231,9 @@ def test_nan_voxels_are_counted(tmp_path, suffix, dtype):
 def test_big_endian_nifti_with_nan(tmp_path):
     path = write(tmp_path / "a.nii", phantom("float32"))
     header = bytearray(path.read_bytes()[:352])
-    for kind, at, count in (("i4", 0, 1), ("i4", 32, 1), ("i2", 40, 8), ("f4", 56, 3), ("i2", 68, 4), ("f4", 76, 11),
-                            ("i2", 120, 1), ("f4", 124, 4), ("i4", 140, 2), ("i2", 252, 2), ("f4", 256, 18)):  # fmt: skip
+    fields = [("i4", 0, 1), ("i4", 32, 1), ("i2", 40, 8), ("f4", 56, 3), ("i2", 68, 4), ("f4", 76, 11), ("i2", 120, 1)]
+    fields += [("f4", 124, 4), ("i4", 140, 2), ("i2", 252, 2), ("f4", 256, 18)]
+    for kind, at, count in fields:
         size = int(kind[1]) * count
         numbers = np.frombuffer(bytes(header[at : at + size]), "<" + kind)
         header[at : at + size] = numbers.astype(">" + kind).tobytes()
