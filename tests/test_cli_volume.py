@@ -110,7 +110,7 @@ def test_every_verb_that_loads_scenes_takes_volumes(cli: Run, verb: str) -> None
 
 @pytest.mark.parametrize(
     ("path", "name"),
-    [("a/head.nii.gz", "head"), ("head.v2.nrrd", "head.v2"), ("bunny.ply", "bunny"), ("x_9x7_uint8.raw", "x_9x7_uint8")],
+    [("a/head.nii.gz", "head"), ("head.v2.nrrd", "head.v2"), ("bunny.ply", "bunny"), ("x_9x7x5.raw", "x_9x7x5")],
 )
 def test_outputs_are_called_after_inputs(path: str, name: str) -> None:
     assert common.stem(Path(path)) == name
