@@ -138,7 +138,8 @@ def test_maximum_up_to_a_wall_is_put_over_it(depth, value):
 
 
 def test_maximum_is_put_over_composite_volumes():
-    volume = fog(4.0, 5.0, BLUE, mode="mip", transfer=Transfer([(0, *BLUE, 1), (5, *BLUE, 3), (9, *BLUE, 4)]))
+    """Also where it lies behind half of their opacity: only opaque things end its rays."""
+    volume = fog(5.0, 5.9, BLUE, mode="mip", transfer=Transfer([(0, *BLUE, 1), (5, *BLUE, 3), (9, *BLUE, 4)]))
     for scene in ([volume, fog(3.0, 6.0)], [fog(3.0, 6.0), volume]):
         seen = see(Scene(scene, background=(0.0, 1.0, 0.0)), 0.5)
         through = np.exp(-TAU * 3.0 * stretch(SMALL, 0.5))

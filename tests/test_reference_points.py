@@ -267,6 +267,18 @@ def test_surfels_are_lit_once_at_their_centres_on_the_side_of_the_viewer(shading
         np.testing.assert_allclose(found, np.broadcast_to(np.clip(expected, 0, 1), found.shape), atol=1e-12)
 
 
+def test_the_side_that_is_lit_is_the_same_in_all_views():
+    """The centre camera sees a disc from its left; a camera that sees it from the right finds it lit from the left."""
+    normal = np.array((-1.0, 0.0, 0.2)) / np.hypot(1.0, 0.2)
+    disc = surfels((0.5, 0.0, -4.0), normal, 0.8, colors=[(1.0, 1.0, 1.0)], material=Material(0.0, 1.0))
+    light = DirectionalLight(tuple(-normal))
+    for offset in (0.0, 2.0):
+        assert np.sign(normal @ (np.array((offset, 0, 0)) - (0.5, 0, -4))) == (1 if offset == 0 else -1)
+        seen = see(Scene(disc, [light]), offset)
+        assert (seen.through == 0).any()
+        np.testing.assert_allclose(seen.color[seen.through == 0], 1.0, atol=1e-12)
+
+
 # --- panels, samples, passes -----------------------------------------------------------------------------------------
 
 
