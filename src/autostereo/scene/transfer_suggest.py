@@ -9,15 +9,15 @@ from ..errors import InputError
 from .appearance import check_number
 
 SIDE = 96  # voxels along an axis that are looked at
-OPACITY = 0.6  # mean over the axis-parallel rays that meet something
+OPACITY = 0.75  # mean over the axis-parallel rays that meet something
 
 # part of the way from the background to the greatest values, r, g, b, relative opacity
 RAMP = (
-    (0.0, 0.16, 0.30, 0.62, 0.0),
-    (0.15, 0.22, 0.55, 0.72, 0.06),
-    (0.4, 0.93, 0.76, 0.42, 0.25),
-    (0.7, 0.90, 0.45, 0.20, 0.6),
-    (1.0, 1.00, 0.94, 0.86, 1.0),
+    (0.0, 0.20, 0.38, 0.80, 0.0),
+    (0.15, 0.30, 0.65, 0.85, 0.02),
+    (0.4, 1.00, 0.80, 0.45, 0.12),
+    (0.65, 1.00, 0.55, 0.30, 0.45),
+    (1.0, 1.00, 0.95, 0.88, 1.0),
 )
 
 
