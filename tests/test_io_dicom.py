@@ -1,5 +1,7 @@
 """Folders: DICOM series written by SimpleITK, with what is wrong with them in practice; stacks of pictures."""
 
+import locale
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,22 @@ from volume_files import ORIGIN, SHAPE, SPACING, TURN, check_phantom, load_one, 
 sitk = pytest.importorskip("SimpleITK")
 
 SERIES = "1.2.826.0.1.3680043.2.1125.1."
+
+
+@pytest.fixture(autouse=True)
+def same_locale():
+    """SimpleITK sets the locale to C when it writes DICOM, and other tests would decode text as ASCII."""
+    before = locale.setlocale(locale.LC_ALL)
+    yield
+    locale.setlocale(locale.LC_ALL, before)
+
+
+def test_reading_leaves_the_locale_alone(tmp_path):
+    before = locale.setlocale(locale.LC_ALL)
+    write_series(tmp_path)
+    locale.setlocale(locale.LC_ALL, before)
+    load_one(tmp_path)
+    assert locale.setlocale(locale.LC_ALL) == before
 
 
 def write_slice(path, plane, position, turn=TURN, spacing=SPACING, series="1", number=1, **tags):
