@@ -1,0 +1,169 @@
+"""Points on the cpu engine: from clouds to kernels, over what is drawn already."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scene.points import Points
+from ...scene.scene import Scene
+from ..engine import Draw
+from .memory import Memory
+from .mesh_setup import CameraNumbers, camera_numbers
+from .points_setup import WORDS, Grid, View, count_bins, count_keys, fill_bins, fill_order, place_surfels
+from .points_views import FLOAT_ROWS, INT_ROWS, PAD, PLANE, PLANES, VIEWS_AT_ONCE, Scratch, Splats, splat_views
+from .mesh_shade import STRIDE
+from .scene_arrays import light_array
+from .threads import run_rows
+
+SAMPLES = 12_000  # of a block of views: with what else a block touches they stay in L2
+SURFELS = 4096  # that a thread takes at a time
+
+
+class PointArrays(NamedTuple):
+    """Clouds one behind the other, in world space.
+
+    positions (N, 3) float64, normals (N, 3) float32, zero where there is none, radii (N,) and colors (N, 3) float32,
+    material (N,) int32, materials (M, 4) float32: ambient, diffuse, specular, shininess.
+    """
+
+    positions: NDArray[np.float64]
+    normals: NDArray[np.float32]
+    radii: NDArray[np.float32]
+    colors: NDArray[np.float32]
+    material: NDArray[np.int32]
+    materials: NDArray[np.float32]
+
+
+def prepare_points(objects: Sequence[Points]) -> PointArrays:
+    """Gather clouds in world space."""
+    normals = [np.zeros((len(p), 3)) if p.world_normals is None else p.world_normals for p in objects]
+    materials = [(m.ambient, m.diffuse, m.specular, m.shininess) for m in (p.material for p in objects)]
+    return PointArrays(
+        np.concatenate([p.world_positions for p in objects]),
+        np.concatenate(normals).astype(np.float32),
+        np.concatenate([p.world_radii for p in objects]).astype(np.float32),
+        np.concatenate([p.colors for p in objects]),
+        np.repeat(np.arange(len(objects), dtype=np.int32), [len(p) for p in objects]),
+        np.array(materials, np.float32),
+    )
+
+
+def view_grid(views: int, width: int, height: int) -> Grid:
+    """Blocks for which the samples of all views, or as many as are drawn at once, stay in cache."""
+    views = min(views, VIEWS_AT_ONCE)
+    columns = max(48, SAMPLES // views - PAD)
+    blocks = -(-width // columns)
+    columns = -(-width // blocks)
+    rows = int(np.clip(SAMPLES // (views * (columns + PAD)), 1, 16))
+    return Grid(min(rows, height), columns, blocks)
+
+
+def draw_points_views(
+    arrays: PointArrays, scene: Scene, draw: Draw, color: NDArray[np.uint8], depth: NDArray[np.float32], buffers: Memory
+) -> None:
+    """Splat surfels over color (V, H, W, 4) where they are nearer than eye depth (V, H, W); both are updated."""
+    views, height, width = depth.shape
+    grid, camera = view_grid(views, width, height), camera_numbers(draw.camera)
+    splats = splats_at(arrays, scene, draw, (camera, grid), buffers)
+    offsets = np.pad(draw.offsets.astype(np.float32), (0, 15), mode="edge")
+    pool = buffers.pool(("points",), new_scratch)
+    out = color.view(np.int32).reshape(views, height, width)
+
+    def task(first: int, end: int) -> None:
+        with pool as scratch:
+            splat_views((first, end), grid, splats, camera, offsets, scratch, out, depth)
+
+    run_rows(-(-height // grid.rows) * grid.blocks, task)
+
+
+def new_scratch() -> Scratch:
+    """One thread's memory."""
+    return Scratch(
+        np.zeros(PLANES * int(PLANE), np.float32),
+        np.zeros(FLOAT_ROWS * STRIDE, np.float32),
+        np.zeros(INT_ROWS * STRIDE, np.int32),
+    )
+
+
+def splats_at(
+    arrays: PointArrays, scene: Scene, draw: Draw, frame: tuple[CameraNumbers, Grid], buffers: Memory
+) -> Splats:
+    """Bring surfels before the camera, light, cull, sort and bin them; frame = (camera, grid)."""
+    camera, grid = frame
+    count = len(arrays.positions)
+    lights, own_eye = light_array(scene, draw.camera), draw.options.shading != "center"
+    e = np.ascontiguousarray(draw.camera.eye_from_world, dtype=np.float64)
+    turn = np.ascontiguousarray(np.linalg.inv(e[:3, :3]).T)
+    view = View(e, turn, float(draw.culling[0]), float(draw.culling[1]), lights, own_eye)
+    records = buffers.buffer("surfels", (count, WORDS), np.float32)
+    ranges = buffers.buffer("surfel ranges", (count, 4), np.int32)
+    keys = buffers.buffer("surfel keys", (count,), np.int32)
+    words = records.view(np.int32)
+    found: list[tuple[int, int]] = []
+
+    def place(first: int, end: int) -> None:
+        found.append(place_surfels((first, end), arrays, view, camera, grid, records, words, ranges, keys))
+
+    run_rows(count, place, SURFELS)
+    least, greatest = min(low for low, _ in found), max(high for _, high in found)
+    order = buffers.buffer("surfel order", (count,), np.int32)
+    first = np.zeros(2, np.int64)
+    if greatest >= 0:
+        first = counting_sort(
+            count,
+            greatest - least + 1,
+            lambda span, counts: count_keys(span, keys, least, counts),
+            lambda span, cursor: fill_order(span, keys, least, cursor, order),
+        )
+
+    held: list[NDArray[np.int32]] = []
+
+    def make(total: int) -> None:
+        held.append(buffers.buffer("surfel bins", (max(total, 1),), np.int32))
+
+    bin_start = counting_sort(
+        int(first[-1]),
+        -(-int(camera.height) // grid.rows) * grid.blocks,
+        lambda span, counts: count_bins(span, order, ranges, grid.blocks, counts),
+        lambda span, cursor: fill_bins(span, order, ranges, grid.blocks, cursor, held[0]),
+        make,
+    )
+    bins = held[0]
+    seen = buffers.buffer("surfels seen", (len(bins),), np.bool_)
+    return Splats(records, words, bin_start, bins, seen, arrays.materials, lights, own_eye)
+
+
+def counting_sort(
+    count: int,
+    kinds: int,
+    count_span: Callable[[tuple[int, int], NDArray[np.int64]], Any],
+    fill_span: Callable[[tuple[int, int], NDArray[np.int64]], Any],
+    make: Callable[[int], Any] = lambda total: None,
+) -> NDArray[np.int64]:
+    """Sort `count` things into kinds, stably and in parallel; returns where each kind begins, and the end.
+
+    count_span(span, counts) counts the kinds of a span of things, fill_span(span, cursor) writes them from the
+    cursors of their kinds on; between them, make(total) is told the number of all.
+    """
+    chunks = max(1, min(2 * numba.get_num_threads(), count // SURFELS))
+    edges = np.linspace(0, count, chunks + 1).astype(np.int64)
+    counts = np.zeros((chunks, kinds), np.int64)
+
+    def each(step: Callable[[tuple[int, int], NDArray[np.int64]], Any], of: NDArray[np.int64]) -> None:
+        def task(first: int, end: int) -> None:
+            for c in range(first, end):
+                step((edges[c], edges[c + 1]), of[c])
+
+        run_rows(chunks, task, 1)
+
+    each(count_span, counts)
+    start = np.zeros(kinds + 1, np.int64)
+    np.cumsum(counts.sum(axis=0), out=start[1:])
+    make(int(start[-1]))
+    each(fill_span, start[:-1] + np.cumsum(counts, axis=0) - counts)
+    return start
