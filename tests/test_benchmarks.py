@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autostereo.cli.benchmarks import harness, jobs, mesh, peers_moderngl, peers_numpy, peers_vtk, report, workloads
-from autostereo.cli.benchmarks.contenders import BenchOptions
+from autostereo.cli.benchmarks.suite import BenchOptions
 from autostereo.display.rig import Rig
 from autostereo.engines.engine import Camera, Draw, Target, get_engine
 from autostereo.engines.options import Options
@@ -96,7 +96,7 @@ def test_figures_become_json():
     figure = harness.Figure("w", "a / b", 7.0, 6.0, 8.0, bar=harness.Bar(6), times=times).as_dict()
     assert json.loads(json.dumps(figure)) == figure
     assert (figure["bar"], figure["met"]) == ("≥ 6", True)
-    assert figure["times"]["a"] == {"median_s": 2.0, "min_s": 1.0, "max_s": 3.0, "rounds": 3, "frames": 5}
+    assert figure["times"]["a"] == {"median_s": 2.0, "min_s": 1.0, "max_s": 3.0, "rounds": 3, "frames": 5, "scale": 1.0}
 
 
 # --- scenes and cameras ----------------------------------------------------------------------------------------------
@@ -149,6 +149,26 @@ def vtk_loop(*arguments):
         return peers_vtk.VTKLoop(peers_vtk.shared_window(), *arguments)
     except DependencyError as error:
         pytest.skip(str(error))
+
+
+def test_plain_moderngl_has_one_framebuffer_draws_all_faces_and_the_same_picture():
+    scene = workloads.sphere_scene(3, 0.0)
+    rig = workloads.rig_for(scene, 3, SIZE)
+    tuned, plain = (moderngl_loop(scene, rig, SIZE, "sample", plain) for plain in (False, True))
+    assert (len(tuned._targets), len(plain._targets)) == (2, 1)
+    for view in range(3):
+        assert (tuned.picture(view) == plain.picture(view)).all()
+    tuned.release()
+    plain.release()
+    # turned inside out, a ball without culling shows its near half, whose normals point away from light and viewer
+    (ball,) = scene.objects
+    turned = Scene(Mesh(ball.vertices, ball.faces[:, ::-1], material=Material(ambient=0.2, two_sided=False)))
+    brightest = {}
+    for plain in (False, True):
+        loop = moderngl_loop(turned, rig, SIZE, "sample", plain)
+        brightest[plain] = loop.picture(1).max()
+        loop.release()
+    assert brightest == {False: 255, True: 51}
 
 
 @pytest.mark.parametrize("make", [moderngl_loop, vtk_loop], ids=["moderngl", "vtk"])
@@ -252,9 +272,9 @@ def test_numpy_weaves_what_the_cpu_engine_weaves():
 
 
 def test_peak_memory_counts_what_is_touched_and_freed():
-    before = jobs._reset_peak()
+    before = jobs.reset_peak()
     np.ones(60_000_000, np.uint8)
-    assert 50e6 < jobs._peak() - before < 120e6
+    assert 50e6 < jobs.peak() - before < 120e6
 
 
 def test_unknown_work_and_missing_bunny_are_named(tmp_path):
@@ -268,7 +288,8 @@ def test_unknown_work_and_missing_bunny_are_named(tmp_path):
 
 def test_weave_work_reports_equal_pictures(tmp_path, capsys):
     lines: list[str] = []
-    results = report.bench(BenchOptions(quick=True, only=("weave",), repeats=1), tmp_path / "b.json", lines.append)
+    options = BenchOptions(quick=True, only=("weave",), repeats=1)
+    results = report.bench("mesh", options, tmp_path / "b.json", lines.append)
     assert [figure["note"].split()[0] for figure in results] == ["0", "0"]
     assert lines == ["weave a 3360² quilt to 1536×2048"]
     saved = json.loads((tmp_path / "b.json").read_text())

@@ -10,40 +10,44 @@ import typer
 from ..errors import InputError
 from . import common
 
-BENCHES = ("mesh",)
+KERNELS = {"mesh": ("draw_views", "draw_panel"), "volume": ("draw_rows",), "points": ("draw_",)}
 
 
 def bench(
-    name: Annotated[str, typer.Argument(metavar="WHAT", help="What to measure: mesh.")] = "mesh",
+    name: Annotated[
+        str, typer.Argument(metavar="WHAT", help="What to measure: mesh, volume or points.")
+    ] = "mesh",
     json: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Also write the figures here.")] = None,
     only: Annotated[list[str] | None, typer.Option("--only", metavar="WORK", help="Only this; repeatable.")] = None,
+    repeats: Annotated[
+        int | None, typer.Option("--repeats", metavar="N", help="Rounds; 7, or 3 with --quick.")
+    ] = None,
     data: Annotated[
-        Path | None, typer.Option("--data", metavar="DIR", help="Folder with meshes/bun_zipper.ply (Stanford bunny).")
+        Path | None,
+        typer.Option("--data", metavar="DIR", help="Folder with meshes/bun_zipper.ply (Stanford bunny), for mesh."),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Small pictures, three rounds: shows that it works.")] = False,
     quiet: common.Quiet = False,
 ) -> None:
     """Measure rendering speed on this machine.
 
-    Rendering in one pass is compared with the usual loops of one render per view in moderngl and VTK, if they are
-    installed (pip install autostereo[bench]). Ratios are of medians, in one run.
+    Rendering in one pass is compared with one render per view: by this engine (volume, points) and by the usual loops
+    in moderngl (mesh) and VTK (mesh, volume), if they are installed (pip install autostereo[bench]). Ratios are of
+    medians, in one run.
 
     Examples:
       autostereo bench mesh --quick
       autostereo bench mesh --data data --json bench.json
-      autostereo bench mesh --only views-48 --only panel-portrait
+      autostereo bench volume --only views-48 --only panels-8 --repeats 15
+      autostereo bench points
     """
-    if name not in BENCHES:
-        raise InputError(f"bench: expected one of {', '.join(BENCHES)}, got {name!r}")
+    if name not in KERNELS:
+        raise InputError(f"bench: expected one of {', '.join(KERNELS)}, got {name!r}")
     if json is not None:
         common.check_output(json, (".json",))
-    from .benchmarks import mesh, report
-    from .benchmarks.contenders import BenchOptions
+    from .benchmarks import report
+    from .benchmarks.suite import BenchOptions
 
-    options = BenchOptions(quick=quick, only=tuple(only or ()), data=data)
-    common.announce_compilation("cpu", "draw_views", "draw_panel")
-    facts = mesh.facts(options)  # before the run, whose own load does not count
-    results = mesh.run(options, common.note)
-    if json is not None:
-        report.save(json, results, facts)
-    report.show(results, facts)
+    options = BenchOptions(quick=quick, only=tuple(only or ()), data=data, repeats=repeats)
+    common.announce_compilation("cpu", *KERNELS[name])
+    report.bench(name, options, json, common.note)

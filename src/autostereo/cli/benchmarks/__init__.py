@@ -1,4 +1,5 @@
-"""The mesh benchmark: contenders of one job, measured in turns in one process.
+"""The benchmarks: contenders of one job, measured in turns in one process.
 
-`report.bench(BenchOptions(…), path)` measures, prints and saves; `mesh.run(BenchOptions(…))` only measures.
+`report.bench(name, BenchOptions(…), path)` measures, prints and saves; `mesh.run(BenchOptions(…))`, and likewise of
+`volume` and `points`, only measures.
 """

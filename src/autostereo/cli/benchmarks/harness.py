@@ -19,7 +19,11 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 VECTOR_UNITS = ("sse4_2", "avx", "avx2", "fma", "avx512f", "avx512bw", "asimd", "sve")
+Pictures = NDArray[np.uint8]
 MAX_FRAMES = 64  # in a row; enough to hide the tail of a frame
 
 
@@ -36,6 +40,8 @@ class Contender:
     name : str
     frame : callable
         Does the work once; may return before the work is finished.
+    scale : float
+        Times are multiplied by it: where `frame` does only a share of a long work, 1 / share.
     finish : callable
         Waits for what `frame` left under way; timed, once after all frames of a turn.
     enter : callable
@@ -49,14 +55,16 @@ class Contender:
     finish: Callable[[], object] = _nothing
     enter: Callable[[], object] = _nothing
     release: Callable[[], object] = _nothing
+    scale: float = 1.0
 
 
 @dataclass(frozen=True)
 class Times:
-    """Seconds per frame of one contender, one value a round."""
+    """Seconds per frame of one contender, one value a round; `scale` is already in them."""
 
     seconds: tuple[float, ...]
     frames: int = 1
+    scale: float = 1.0
 
     @property
     def median(self) -> float:
@@ -64,13 +72,14 @@ class Times:
         return statistics.median(self.seconds)
 
     def as_dict(self) -> dict[str, float]:
-        """Median, minimum, maximum, rounds, and frames in a row per round."""
+        """Median, minimum, maximum, rounds, frames in a row per round, and what a frame's time was multiplied by."""
         return {
             "median_s": self.median,
             "min_s": min(self.seconds),
             "max_s": max(self.seconds),
             "rounds": len(self.seconds),
             "frames": self.frames,
+            "scale": self.scale,
         }
 
 
@@ -103,14 +112,14 @@ def measure(contenders: Sequence[Contender], repeats: int, minimum: float = 0.1)
             for turn in range(repeats):
                 order = range(len(contenders))
                 for k in reversed(order) if turn % 2 else order:
-                    seconds[k].append(_turn(contenders[k], frames[k]))
+                    seconds[k].append(contenders[k].scale * _turn(contenders[k], frames[k]))
         finally:
             if collecting:
                 gc.enable()
     finally:
         for contender in contenders:
             contender.release()
-    return {c.name: Times(tuple(s), n) for c, s, n in zip(contenders, seconds, frames, strict=True)}
+    return {c.name: Times(tuple(s), n, c.scale) for c, s, n in zip(contenders, seconds, frames, strict=True)}
 
 
 def _turn(contender: Contender, frames: int) -> float:
@@ -196,6 +205,40 @@ def band(compute: Callable[..., float], *times: Times) -> tuple[float, float, fl
 def ratio(slow: float, fast: float) -> float:
     """How many times faster `fast` is."""
     return slow / fast
+
+
+@dataclass(frozen=True)
+class Measured:
+    """The times of one work's contenders, from which figures are made."""
+
+    work: str
+    times: dict[str, Times]
+    scene: str = ""
+    lighting: str = ""
+
+    def ratio(self, slow: str, fast: str, bar: Bar | None = None, note: str = "") -> Figure:
+        """The figure "slow / fast"; its note also says which of the two did only a share of the work."""
+        pair = {name: self.times[name] for name in (slow, fast)}
+        shares = [f"{name}: 1/{t.scale:g} of its views timed, × {t.scale:g}" for name, t in pair.items() if t.scale > 1]
+        return Figure(
+            self.work,
+            f"{slow} / {fast}",
+            *band(ratio, *pair.values()),
+            scene=self.scene,
+            lighting=self.lighting,
+            bar=bar,
+            times=self.times,
+            note="; ".join([note, *shares] if note else shares),
+        )
+
+
+def unlike(measured: str, stack: Pictures, other: Pictures, scene: str = "") -> Figure:
+    """Share of pixels of the outermost views (V, H, W, C) that differ by more than one level in any channel."""
+    shares = [
+        100 * float(np.mean(np.abs(stack[view].astype(int) - other[view]).max(axis=2) > 1)) for view in (0, -1)
+    ]
+    note, bar = "of the outermost views, by more than one level", Bar(2, at_least=False)
+    return Figure("agreement", measured, max(shares), min(shares), max(shares), "%", scene, bar=bar, note=note)
 
 
 def cores() -> int:

@@ -75,20 +75,32 @@ def weave_job(quilt_size: Size, panel_size: Size) -> tuple[Callable[[], NDArray[
 def peak_memory(job: str, lighting: str, quick: bool = False) -> tuple[int, int]:
     """Bytes at the peak of `job` in a fresh process above those after a tiny warm-up render, and bytes of output."""
     code = f"from autostereo.cli.benchmarks.jobs import _memory_main; _memory_main({job!r}, {lighting!r}, {quick})"
+    above, output = run_alone(f"bench memory, {job}", code)
+    return above, output
+
+
+def run_alone(name: str, code: str) -> Any:
+    """Run Python code in a fresh process and return what its last line prints as JSON.
+
+    Raises
+    ------
+    AutostereoError
+        It failed; the message has the last line of its complaint.
+    """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     if done.returncode:
-        raise AutostereoError(f"bench memory: {job} failed: {done.stderr.strip().splitlines()[-1:]}")
-    above, output = json.loads(done.stdout.splitlines()[-1])
-    return above, output
+        complaint = done.stderr.strip().splitlines() or [f"exit {done.returncode}"]  # killed: it says nothing
+        raise AutostereoError(f"{name}: {complaint[-1].rpartition('Error: ')[2]}")
+    return json.loads(done.stdout.splitlines()[-1])
 
 
 def _memory_main(job: str, lighting: str, quick: bool) -> None:
     """Body of the process: print [bytes above the warm-up, bytes of output] as JSON."""
     _memory_job(job, lighting, 2, 16)()
     work = _memory_job(job, lighting, 4 if quick else 6, 4 if quick else 1)
-    before = _reset_peak()
+    before = reset_peak()
     output = work()
-    print(json.dumps([_peak() - before, output.nbytes]))
+    print(json.dumps([peak() - before, output.nbytes]))
 
 
 def _memory_job(job: str, lighting: str, subdivision: int, shrink: int) -> Callable[[], NDArray[np.uint8]]:
@@ -116,17 +128,17 @@ def _memory_job(job: str, lighting: str, subdivision: int, shrink: int) -> Calla
     return stack if job == "views-96" else panel
 
 
-def _reset_peak() -> int:
+def reset_peak() -> int:
     """Forget the peak so far, where the system can, and return the bytes that count as the start."""
     try:
         Path("/proc/self/clear_refs").write_text("5")
         return _status_bytes("VmRSS")
     except OSError:
-        return _peak()
+        return peak()
 
 
-def _peak() -> int:
-    """Largest resident size in bytes, since `_reset_peak` where the system can."""
+def peak() -> int:
+    """Largest resident size in bytes, since `reset_peak` where the system can."""
     try:
         return _status_bytes("VmHWM")
     except OSError:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -12,13 +12,16 @@ import numpy as np
 from ...engines.options import Options
 from ...errors import InputError
 from . import jobs, workloads
-from .contenders import MODERNGL, OURS, VTK, BenchOptions, Studio
-from .harness import Bar, Contender, Figure, Times, band, machine_facts, measure, ratio
+from .contenders import OURS, VTK
+from .harness import Bar, Contender, Figure, Measured, Times, band, machine_facts, measure, ratio
+from .mesh_contenders import MODERNGL, MeshStudio
+from .suite import BenchOptions, Say, Work, check_works, run_works
 
 if TYPE_CHECKING:
     from ...display.display import Display
     from .workloads import Size
 
+SCENES = ("sphere", "bunny")
 LIGHTINGS = ("vertex", "sample")
 
 Bars = dict[str, tuple[float, float]]  # by peer: at least so many times faster, vertex-lit and per-sample-lit
@@ -39,17 +42,7 @@ DISPLAYS: dict[str, Callable[[Size], Display]] = {
 }
 
 
-@dataclass(frozen=True)
-class Work:
-    """A row of the table: its title and how it is measured, per scene and lighting where it has them."""
-
-    title: str
-    figures: Callable[[Studio, str, str], list[Figure]]
-    scenes: tuple[str, ...] = ("sphere", "bunny")
-    lightings: tuple[str, ...] = LIGHTINGS
-
-
-def run(options: BenchOptions | None = None, say: Callable[[str], object] = print) -> list[dict[str, Any]]:
+def run(options: BenchOptions | None = None, say: Say = print) -> list[dict[str, Any]]:
     """Measure every work of `options` and return its figures.
 
     Parameters
@@ -61,8 +54,7 @@ def run(options: BenchOptions | None = None, say: Callable[[str], object] = prin
     Returns
     -------
     list of dict
-        The fields of `harness.Figure`: work, scene, lighting, measure, value with its noise band low … high, unit,
-        bar, met (None where nothing is asked, or if quick), times by contender in seconds, note.
+        See `suite.run_works`.
 
     Raises
     ------
@@ -70,34 +62,18 @@ def run(options: BenchOptions | None = None, say: Callable[[str], object] = prin
         A name in `only` is no work.
     """
     options = options or BenchOptions()
-    chosen = options.only or tuple(WORKS)
-    unknown = [name for name in chosen if name not in WORKS]
-    if unknown:
-        raise InputError(f"bench mesh: there is no work {unknown[0]!r}; there are {', '.join(WORKS)}")
-    studio = Studio(options, say)
-    has_bunny = _has_bunny(options, say)
-    figures: list[Figure] = []
-    for name in chosen:
-        work = WORKS[name]
-        for scene in work.scenes:
-            if scene == "bunny" and not has_bunny:
-                continue
-            for lighting in work.lightings:
-                say(" · ".join(word for word in (work.title, scene, lighting and f"lit per {lighting}") if word))
-                figures += work.figures(studio, scene, lighting)
-    results = [figure.as_dict() for figure in figures]
-    if options.quick:
-        results = [figure | {"met": None} for figure in results]
-    return results
+    check_works("mesh", WORKS, options.only)
+    without = () if _has_bunny(options, say) else ("bunny",)
+    return run_works(WORKS, MeshStudio(options, say), options, say, without)
 
 
 def facts(options: BenchOptions | None = None) -> dict[str, Any]:
     """Facts about this machine that the figures depend on, the peers' OpenGL among them."""
-    studio = Studio(options or BenchOptions(), lambda line: None)
+    studio = MeshStudio(options or BenchOptions(), lambda line: None)
     return machine_facts() | {"opengl": studio.gl_renderer()}
 
 
-def _has_bunny(options: BenchOptions, say: Callable[[str], object]) -> bool:
+def _has_bunny(options: BenchOptions, say: Say) -> bool:
     if options.quick:
         return False
     if options.data is None:
@@ -111,76 +87,67 @@ def _has_bunny(options: BenchOptions, say: Callable[[str], object]) -> bool:
 # --- works -----------------------------------------------------------------------------------------------------------
 
 
-def _against_peers(label: tuple[str, str, str], times: dict[str, Times], bars: Bars, note: str) -> list[Figure]:
-    """How many times faster than each peer, with the bar for this lighting."""
-    work, scene, lighting = label
+def _against_peers(measured: Measured, bars: Bars, note: str) -> list[Figure]:
+    """How many times faster than each peer, with the bar for this lighting; plain loops are held to none."""
     figures = []
-    for peer in times:
-        if peer in (OURS, "write"):
-            continue
-        asked = Bar(bars[peer][LIGHTINGS.index(lighting)]) if peer in bars else None
-        value = band(ratio, times[peer], times[OURS])
-        figures.append(
-            Figure(work, f"{peer} / {OURS}", *value, scene=scene, lighting=lighting, bar=asked, times=times, note=note)
-        )
+    for peer in measured.times:
+        if peer not in (OURS, "write"):
+            bar = Bar(bars[peer][LIGHTINGS.index(measured.lighting)]) if peer in bars else None
+            figures.append(measured.ratio(peer, OURS, bar, note))
     return figures
 
 
-def _views(name: str) -> Callable[[Studio, str, str], list[Figure]]:
+def _views(name: str) -> Callable[[MeshStudio, str, str], list[Figure]]:
     """A stack of views against V passes, and against merely writing it."""
     views, full_size, bars = VIEWS[name]
 
-    def figures(studio: Studio, scene_name: str, lighting: str) -> list[Figure]:
+    def figures(studio: MeshStudio, scene_name: str, lighting: str) -> list[Figure]:
         scene, size = studio.scene(scene_name, lighting), studio.size(*full_size)
         rig = workloads.rig_for(scene, views, size)
-        contenders = [studio.views(scene, rig, size, lighting), *studio.moderngl(scene, rig, size, lighting)]
+        contenders = [studio.lit_views(scene, rig, size, lighting), *studio.moderngl(scene, rig, size, lighting)]
         if VTK in bars:
             contenders += studio.vtk(scene, rig, size, lighting)
         contenders.append(studio.write(views * size[0] * size[1] * 4))
-        times = measure(contenders, studio.options.rounds)
+        measured = Measured(name, measure(contenders, studio.options.rounds), scene_name, lighting)
         note = f"{_coverage(studio, scene_name, lighting, size):.0%} of a view covered"
-        result = _against_peers((name, scene_name, lighting), times, bars, note)
         asked = WRITE_BAR if name == "views-96" and lighting == "vertex" else None
-        value = band(ratio, times[OURS], times["write"])
-        result.append(
-            Figure(name, f"{OURS} / write", *value, scene=scene_name, lighting=lighting, bar=asked, times=times)
-        )
-        return result
+        return [*_against_peers(measured, bars, note), measured.ratio(OURS, "write", asked)]
 
     return figures
 
 
-def _coverage(studio: Studio, scene_name: str, lighting: str, size: Size) -> float:
+def _coverage(studio: MeshStudio, scene_name: str, lighting: str, size: Size) -> float:
     """Share of the centre view's pixels that show the scene."""
     scene = studio.scene(scene_name, lighting)
     stack = studio.renderer(scene).render_views(workloads.rig_for(scene, 1, size), size=size)
     return float(np.count_nonzero(stack.color[..., 3]) / stack.color[..., 3].size)
 
 
-def _panel(name: str) -> Callable[[Studio, str, str], list[Figure]]:
+def _panel(name: str) -> Callable[[MeshStudio, str, str], list[Figure]]:
     """An interlaced panel against the V passes alone, without their weaving."""
     panel_size, source, bars = PANELS[name]
     views, view_size, _ = VIEWS[source]
 
-    def figures(studio: Studio, scene_name: str, lighting: str) -> list[Figure]:
+    def figures(studio: MeshStudio, scene_name: str, lighting: str) -> list[Figure]:
         scene, size = studio.scene(scene_name, lighting), studio.size(*view_size)
         display = DISPLAYS[name](studio.size(*panel_size))
         rig = workloads.rig_for(scene, views, (display.width, display.height))
         peer_rig = workloads.rig_for(scene, views, size)
-        contenders = [studio.panel(scene, display, rig, lighting), *studio.moderngl(scene, peer_rig, size, lighting)]
+        contenders = [studio.lit_panel(scene, display, rig, lighting)]
+        contenders += studio.moderngl(scene, peer_rig, size, lighting)
         if VTK in bars:
             contenders += studio.vtk(scene, peer_rig, size, lighting)
-        times = measure(contenders, studio.options.rounds)
-        return _against_peers((name, scene_name, lighting), times, bars, f"peers: {source}, unwoven")
+        measured = Measured(name, measure(contenders, studio.options.rounds), scene_name, lighting)
+        return _against_peers(measured, bars, f"peers: {source}, unwoven")
 
     return figures
 
 
-def _added_view(studio: Studio, scene_name: str, lighting: str) -> list[Figure]:
+def _added_view(studio: MeshStudio, scene_name: str, lighting: str) -> list[Figure]:
     """The cost of a view more, from 48 to 96, in times of writing its pixels."""
     scene, size = studio.scene(scene_name, lighting), studio.size(1024, 512)
     contenders = [
-        studio.views(scene, workloads.rig_for(scene, views, size), size, lighting, name)
+        studio.lit_views(scene, workloads.rig_for(scene, views, size), size, lighting, name)
         for views, name in ((48, "48 views"), (96, "96 views"))
     ]
     contenders.append(studio.write(48 * size[0] * size[1] * 4))
@@ -191,16 +158,16 @@ def _added_view(studio: Studio, scene_name: str, lighting: str) -> list[Figure]:
     return [Figure("added-view", measured, *value, scene=scene_name, lighting=lighting, bar=bar, times=times)]
 
 
-def _million(studio: Studio, scene_name: str, lighting: str) -> list[Figure]:
+def _million(studio: MeshStudio, scene_name: str, lighting: str) -> list[Figure]:
     """How the time grows with the number of triangles, 82k to 1.3 million: 1 is linear."""
     views, full_size, _ = VIEWS["views-48"]
     size = studio.size(*full_size)
     contenders, triangles = [], []
     for name in (scene_name, "million"):
         scene = studio.scene(name, lighting)
-        triangles.append(len(scene.objects[0].faces))
+        triangles.append(len(workloads.the_mesh(scene).faces))
         label = f"{triangles[-1]:,} triangles"
-        contenders.append(studio.views(scene, workloads.rig_for(scene, views, size), size, lighting, label))
+        contenders.append(studio.lit_views(scene, workloads.rig_for(scene, views, size), size, lighting, label))
     times = measure(contenders, studio.options.rounds)
     growth = triangles[1] / triangles[0]
     value = band(lambda few, many: many / few / growth, *times.values())
@@ -209,7 +176,7 @@ def _million(studio: Studio, scene_name: str, lighting: str) -> list[Figure]:
     return [Figure("million", measured, *value, scene=scene_name, lighting=lighting, bar=bar, times=times, note=note)]
 
 
-def _weave(studio: Studio, scene_name: str, lighting: str) -> list[Figure]:
+def _weave(studio: MeshStudio, scene_name: str, lighting: str) -> list[Figure]:
     """A 3360² quilt to a 1536×2048 panel against NumPy's fancy indexing, its index arrays made beforehand or not."""
     from .peers_numpy import weave_index
 
@@ -230,7 +197,7 @@ def _weave(studio: Studio, scene_name: str, lighting: str) -> list[Figure]:
     ]
 
 
-def _threads(studio: Studio, scene_name: str, lighting: str) -> list[Figure]:
+def _threads(studio: MeshStudio, scene_name: str, lighting: str) -> list[Figure]:
     """One thread against two, for a stack and for a panel."""
     if jobs.available_threads() < 2:
         studio.say("without thread scaling: Numba has one thread here")
@@ -240,8 +207,8 @@ def _threads(studio: Studio, scene_name: str, lighting: str) -> list[Figure]:
     stack_rig = workloads.rig_for(scene, 96, size)
     panel_rig = workloads.rig_for(scene, display.views, (display.width, display.height))
     works = {
-        "views-96": studio.views(scene, stack_rig, size, lighting),
-        "panel-portrait": studio.panel(scene, display, panel_rig, lighting),
+        "views-96": studio.lit_views(scene, stack_rig, size, lighting),
+        "panel-portrait": studio.lit_panel(scene, display, panel_rig, lighting),
     }
     figures = []
     for name, work in works.items():
@@ -259,7 +226,7 @@ def _threads(studio: Studio, scene_name: str, lighting: str) -> list[Figure]:
     return figures
 
 
-def _memory(studio: Studio, scene_name: str, lighting: str) -> list[Figure]:
+def _memory(studio: MeshStudio, scene_name: str, lighting: str) -> list[Figure]:
     """Peak memory of whole jobs in fresh processes, above a warm-up and the output."""
     figures = []
     for job in jobs.MEMORY_JOBS:
@@ -274,7 +241,7 @@ def _memory(studio: Studio, scene_name: str, lighting: str) -> list[Figure]:
     return figures
 
 
-def _start(studio: Studio, scene_name: str, lighting: str) -> list[Figure]:
+def _start(studio: MeshStudio, scene_name: str, lighting: str) -> list[Figure]:
     """Seconds of importing, and of rendering the bunny on the command line for the first and the second time."""
     rounds = studio.options.rounds
     imported = Times(tuple(jobs.import_seconds() for _ in range(rounds)))
@@ -289,7 +256,7 @@ def _start(studio: Studio, scene_name: str, lighting: str) -> list[Figure]:
     ]
 
 
-def _agreement(studio: Studio, scene_name: str, lighting: str) -> list[Figure]:
+def _agreement(studio: MeshStudio, scene_name: str, lighting: str) -> list[Figure]:
     """The contenders draw the same picture: share of pixels of the outermost views off by more than two levels."""
     scene, size = studio.scene(scene_name, lighting), studio.size(512, 512)
     rig = workloads.rig_for(scene, 8, size)
@@ -312,17 +279,17 @@ def _agreement(studio: Studio, scene_name: str, lighting: str) -> list[Figure]:
     return figures
 
 
-WORKS: dict[str, Work] = {
-    "agreement": Work("the contenders' pictures", _agreement),
-    "views-8": Work("8 views 512×512", _views("views-8")),
-    "views-48": Work("48 views 420×560", _views("views-48")),
-    "views-96": Work("96 views 1024×512", _views("views-96")),
-    "panel-portrait": Work("continuous panel 1536×2048", _panel("panel-portrait")),
-    "panel-8k": Work("panel 7680×4320, 96 views", _panel("panel-8k")),
-    "added-view": Work("an added view, 48 to 96 at 1024×512", _added_view),
-    "million": Work("48 views 420×560 of 1.3 million triangles", _million, ("sphere",)),
-    "weave": Work("weave a 3360² quilt to 1536×2048", _weave, ("",), ("",)),
-    "threads": Work("thread scaling", _threads, ("sphere",)),
-    "memory": Work("peak memory", _memory, ("sphere",)),
-    "start": Work("starting", _start, ("",), ("",)),
+WORKS: dict[str, Work[MeshStudio]] = {
+    "agreement": Work("the contenders' pictures", _agreement, SCENES, LIGHTINGS),
+    "views-8": Work("8 views 512×512", _views("views-8"), SCENES, LIGHTINGS),
+    "views-48": Work("48 views 420×560", _views("views-48"), SCENES, LIGHTINGS),
+    "views-96": Work("96 views 1024×512", _views("views-96"), SCENES, LIGHTINGS),
+    "panel-portrait": Work("continuous panel 1536×2048", _panel("panel-portrait"), SCENES, LIGHTINGS),
+    "panel-8k": Work("panel 7680×4320, 96 views", _panel("panel-8k"), SCENES, LIGHTINGS),
+    "added-view": Work("an added view, 48 to 96 at 1024×512", _added_view, SCENES, LIGHTINGS),
+    "million": Work("48 views 420×560 of 1.3 million triangles", _million, ("sphere",), LIGHTINGS),
+    "weave": Work("weave a 3360² quilt to 1536×2048", _weave),
+    "threads": Work("thread scaling", _threads, ("sphere",), LIGHTINGS),
+    "memory": Work("peak memory", _memory, ("sphere",), LIGHTINGS),
+    "start": Work("starting", _start),
 }

@@ -1,8 +1,13 @@
-"""Peer A: a bare moderngl loop that renders the V views one after another.
+"""Peer A: a bare moderngl loop that renders the V views one after another, in two variants.
 
-What a careful programmer writes: one indexed vertex buffer, matrices computed beforehand, one uniform and one draw a
-view, back-face culling where the mesh is closed, no read-back. Views alternate between two framebuffers, so that a
-software GL transforms the next view while it rasterises this one (15 to 20 % faster than one framebuffer on llvmpipe).
+Both have one indexed vertex buffer, matrices computed beforehand, one uniform and one draw a view, and no read-back.
+
+``tuned``
+    As far as we could get it: back-face culling where the mesh is closed, and views alternate between two framebuffers,
+    so that a software GL transforms the next view while it rasterises this one (15 to 20 % faster on llvmpipe).
+``plain``
+    What a program has that does not think of either: one framebuffer, and all faces are drawn.
+
 Lighting follows the material in the vertex shader (Gouraud) or in the fragment shader (Blinn–Phong); the highlight is
 compiled in only if the material has one.
 """
@@ -20,7 +25,7 @@ from ...errors import DependencyError
 from ...scene.appearance import Material
 from ...scene.mesh import Mesh
 from ...scene.scene import Scene
-from .workloads import Size, clip_from_world, eyes, world_arrays
+from .workloads import Size, clip_from_world, eyes, the_mesh, world_arrays
 
 _LIGHT = """
 uniform vec3 to_light;
@@ -133,12 +138,16 @@ class ModernGLLoop:
     size : (int, int)
         Width and height of one view in pixels.
     lighting : {"vertex", "sample"}
+    plain : bool
+        The variant.
     """
 
     name = "moderngl"
 
-    def __init__(self, context: Any, scene: Scene, rig: Rig, size: Size, lighting: str) -> None:
-        (mesh,) = scene.objects
+    def __init__(
+        self, context: Any, scene: Scene, rig: Rig, size: Size, lighting: str, plain: bool = False
+    ) -> None:
+        mesh = the_mesh(scene)
         self._context = context
         self._size = size
         self._background = (*scene.background, 0.0)
@@ -152,7 +161,8 @@ class ModernGLLoop:
             content = [(self._vertices, "3f4 3f4 3f4", "position", "normal", "kd")]
             self._mesh = context.vertex_array(self._program, content, index_buffer=self._faces)
             self._targets = [
-                context.framebuffer([context.renderbuffer(size, 4)], context.depth_renderbuffer(size)) for _ in range(2)
+                context.framebuffer([context.renderbuffer(size, 4)], context.depth_renderbuffer(size))
+                for _ in range(1 if plain else 2)
             ]
             self._program["to_light"].write((-rig.eye_from_world[2, :3]).astype("f4").tobytes())
         self._matrix, self._eye = self._program["clip_from_world"], self._program.get("eye", None)
@@ -161,13 +171,13 @@ class ModernGLLoop:
         # vertices are lit for the centre eye, so that all views show the same colours
         lit_for = eyes(rig) if lighting == "sample" else np.broadcast_to(rig.position, (rig.views, 3))
         self._eyes = [eye.astype("f4").tobytes() for eye in lit_for]
-        self._two_sided = mesh.two_sided
+        self._all_faces = plain or mesh.two_sided
 
     def enter(self) -> None:
         """Make this loop's context and state current."""
         context = self._context
         context.__enter__()
-        context.enable_only(context.DEPTH_TEST if self._two_sided else context.DEPTH_TEST | context.CULL_FACE)
+        context.enable_only(context.DEPTH_TEST if self._all_faces else context.DEPTH_TEST | context.CULL_FACE)
 
     def frame(self) -> None:
         """Draw every view once."""
@@ -175,7 +185,7 @@ class ModernGLLoop:
             self._draw(view)
 
     def _draw(self, view: int) -> Any:
-        target = self._targets[view % 2]
+        target = self._targets[view % len(self._targets)]
         target.use()
         target.clear(*self._background)
         self._matrix.write(self._matrices[view])

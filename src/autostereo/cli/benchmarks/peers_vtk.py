@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 
 from ...display.rig import Rig
 from ...errors import DependencyError
-from ...scene.appearance import Material
+from ...scene.appearance import Material, Vector
 from ...scene.scene import Scene
-from .workloads import Size, clip_from_centre, eyes, world_arrays
+from .workloads import Size, clip_from_centre, eyes, the_mesh, world_arrays
 
 # in a process of its own: SupportsOpenGL ends the EGL display in passing, and without a display VTK may crash
 _PROBE = """
@@ -62,37 +62,40 @@ def shared_window() -> Any:
     return window
 
 
-class VTKLoop:
-    """V passes over one mesh.
+class ViewLoop:
+    """V passes over one prop.
 
     Parameters
     ----------
     window : vtkEGLRenderWindow
         From `shared_window`.
-    scene : Scene
-        One mesh, no texture, the default light.
+    prop : vtkProp3D
+        What is drawn.
+    background : (3,) float
     rig : Rig
     size : (int, int)
         Width and height of one view in pixels.
-    variant : {"tuned", "plain", "prelit"}
     """
 
-    def __init__(self, window: Any, scene: Scene, rig: Rig, size: Size, variant: str = "tuned") -> None:
+    plain = False
+    """VTK's defaults and its filter for pictures of windows, or what is faster."""
+    far_depth: float | None = None
+    """Depth of a far plane, if there must be one."""
+
+    def __init__(self, window: Any, prop: Any, background: Vector, rig: Rig, size: Size) -> None:
         from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
-        from vtkmodules.vtkCommonMath import vtkMatrix4x4
         from vtkmodules.vtkRenderingCore import vtkRenderer, vtkWindowToImageFilter
 
         forward = rig.eye_from_world[2, :3]
         self._size = size
-        self._plain = variant == "plain"
         self._pixels = vtkUnsignedCharArray()
         self._renderer = renderer = vtkRenderer()
-        renderer.SetBackground(*scene.background)
-        if not self._plain:
+        renderer.SetBackground(*background)
+        if not self.plain:
             renderer.GetCullers().RemoveAllItems()
         renderer.SetAutomaticLightCreation(False)
         renderer.AddLight(_light(forward))
-        renderer.AddActor(_actor(scene, variant, -forward))
+        renderer.AddViewProp(prop)
         self._window = window
         self._filter = vtkWindowToImageFilter()
         self._filter.SetInput(window)
@@ -100,17 +103,11 @@ class VTKLoop:
         self._filter.ShouldRerenderOff()
         self._camera = camera = renderer.GetActiveCamera()
         camera.SetViewUp(*rig.up)
-        camera.SetClippingRange(rig.near_depth, 1e4 * rig.near_depth)
+        camera.SetClippingRange(rig.near_depth, self.far_depth or 1e4 * rig.near_depth)
         camera.SetUseExplicitProjectionTransformMatrix(True)
         self._eyes = eyes(rig)
         self._targets = self._eyes + forward * rig.focal
-        self._projections = []
-        for clip, offset in zip(clip_from_centre(rig, size), rig.camera_offsets, strict=True):
-            clip[:, 3] += clip[:, 0] * offset + clip[:, 1] * rig.offset_y  # from this camera, not the centre one
-            clip[:, 2] *= -1  # VTK's camera looks along −z
-            matrix = vtkMatrix4x4()
-            matrix.DeepCopy(clip.ravel().tolist())
-            self._projections.append(matrix)
+        self._projections = [_projection(rig, size, view, self.far_depth) for view in range(rig.views)]
 
     def enter(self) -> None:
         """Make the window's context current and this loop its content."""
@@ -119,7 +116,7 @@ class VTKLoop:
         if not window.HasRenderer(self._renderer):
             for other in list(window.GetRenderers()):
                 window.RemoveRenderer(other)
-            if self._plain:
+            if self.plain:
                 window.SetFrameBlitModeToBlitToHardware()
             else:
                 window.SetFrameBlitModeToNoBlit()
@@ -140,7 +137,7 @@ class VTKLoop:
         camera.SetFocalPoint(self._targets[view])
         camera.SetExplicitProjectionTransformMatrix(self._projections[view])
         self._window.Render()
-        if self._plain:
+        if self.plain:
             self._filter.Modified()
             self._filter.Update()
             return
@@ -153,7 +150,7 @@ class VTKLoop:
 
         self.enter()
         self._draw(view)
-        data = self._filter.GetOutput().GetPointData().GetScalars() if self._plain else self._pixels
+        data = self._filter.GetOutput().GetPointData().GetScalars() if self.plain else self._pixels
         pixels = vtk_to_numpy(data).reshape(self._size[1], self._size[0], -1)
         return pixels[::-1, :, :3].copy()
 
@@ -162,6 +159,41 @@ class VTKLoop:
         self._window.MakeCurrent()
         self._renderer.ReleaseGraphicsResources(self._window)
         self._window.RemoveRenderer(self._renderer)
+
+
+class VTKLoop(ViewLoop):
+    """V passes over one mesh.
+
+    Parameters
+    ----------
+    window : vtkEGLRenderWindow
+        From `shared_window`.
+    scene : Scene
+        One mesh, no texture, the default light.
+    rig : Rig
+    size : (int, int)
+        Width and height of one view in pixels.
+    variant : {"tuned", "plain", "prelit"}
+    """
+
+    def __init__(self, window: Any, scene: Scene, rig: Rig, size: Size, variant: str = "tuned") -> None:
+        self.plain = variant == "plain"
+        actor = _actor(scene, variant, -rig.eye_from_world[2, :3])
+        super().__init__(window, actor, scene.background, rig, size)
+
+
+def _projection(rig: Rig, size: Size, view: int, far: float | None) -> Any:
+    """Explicit off-axis projection of one camera, without or with a far plane."""
+    from vtkmodules.vtkCommonMath import vtkMatrix4x4
+
+    clip, near = clip_from_centre(rig, size)[view], rig.near_depth
+    clip[:, 3] += clip[:, 0] * rig.camera_offsets[view] + clip[:, 1] * rig.offset_y  # from this camera, not the centre
+    if far is not None:
+        clip[2, 2:] = (far + near) / (far - near), -2 * far * near / (far - near)
+    clip[:, 2] *= -1  # VTK's camera looks along −z
+    matrix = vtkMatrix4x4()
+    matrix.DeepCopy(clip.ravel().tolist())
+    return matrix
 
 
 def _light(forward: NDArray[np.float64]) -> Any:
@@ -173,13 +205,14 @@ def _light(forward: NDArray[np.float64]) -> Any:
     light.SetPositional(False)
     light.SetPosition(*(-forward))
     light.SetFocalPoint(0.0, 0.0, 0.0)
+    light.SetAmbientColor(1.0, 1.0, 1.0)  # volumes take their ambient light from it, surfaces do not
     return light
 
 
 def _actor(scene: Scene, variant: str, to_light: NDArray[np.float64]) -> Any:
     from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
-    (mesh,) = scene.objects
+    mesh = the_mesh(scene)
     material = mesh.material or Material()
     mapper = vtkPolyDataMapper()
     mapper.SetInputData(_polydata(scene, variant, to_light))
@@ -207,7 +240,7 @@ def _polydata(scene: Scene, variant: str, to_light: NDArray[np.float64]) -> Any:
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 
-    (mesh,) = scene.objects
+    mesh = the_mesh(scene)
     positions, normals, colors = world_arrays(scene)
     data = vtkPolyData()
     points, triangles = vtkPoints(), vtkCellArray()

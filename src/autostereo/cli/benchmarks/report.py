@@ -1,36 +1,40 @@
-"""Showing and saving what the mesh benchmark measured."""
+"""Showing and saving what a benchmark measured. SUITES lists every benchmark."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from ...image import write_atomic
-from .contenders import BenchOptions
+from . import mesh, points, volume
+from .suite import BenchOptions, Say
 
 Results = Sequence[dict[str, Any]]
 
+SUITES: dict[str, ModuleType] = {"mesh": mesh, "volume": volume, "points": points}  # each has WORKS, run, facts
 
-def bench(options: BenchOptions, path: Path | None = None, say: Callable[[str], object] = print) -> Results:
+
+def bench(name: str, options: BenchOptions, path: Path | None = None, say: Say = print) -> Results:
     """Measure, print the tables and, if `path` is given, write everything as JSON.
 
     Parameters
     ----------
+    name : {"mesh", "volume", "points"}
     options : BenchOptions
     path : Path, optional
         Written when all is measured.
     say : callable
         Is told in one line what is being measured and what is left out.
     """
-    from . import mesh
-
-    facts = mesh.facts(options)
-    results = mesh.run(options, say)
-    show(results, facts)
+    suite = SUITES[name]
+    facts = suite.facts(options)  # before the run, whose own load does not count
+    results = suite.run(options, say)
     if path is not None:
         save(path, results, facts)
+    show(results, facts)
     return results
 
 
@@ -55,8 +59,9 @@ def describe(facts: dict[str, Any]) -> list[str]:
     lines = [
         f"{facts['processor']}, {facts['cores']} cores, {' '.join(facts['vector_units'])}, load {facts['load']}",
         f"{facts['system']}, Python {facts['python']}, {versions}",
-        f"OpenGL of the peers: {facts.get('opengl') or 'none'}",
     ]
+    if "opengl" in facts:
+        lines.append(f"OpenGL of the peers: {facts['opengl'] or 'none'}")
     if facts["load"] is not None and facts["load"] > 0.5:
         lines.append("This machine is busy with other things: the figures say little.")
     return lines
@@ -73,11 +78,20 @@ def number(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
+WORDS = {"work": "work", "scene": "scene", "lighting": "lit per"}
+
+
+def _where(results: Results) -> list[str]:
+    """Fields that say which work a row belongs to, those left out that no work of this benchmark has."""
+    return [field for field in WORDS if any(f[field] for f in results)]
+
+
 def _figures(results: Results) -> Any:
     from rich.table import Table
 
+    where = _where(results)
     table = Table(title="figures: ratios of medians, with the smallest and largest of a round")
-    for heading in ("work", "scene", "lit per", "measure"):
+    for heading in (*(WORDS[field] for field in where), "measure"):
         table.add_column(heading)
     for heading in ("asked", "reached", "noise"):
         table.add_column(heading, justify="right")
@@ -87,17 +101,16 @@ def _figures(results: Results) -> Any:
         met = "" if f["met"] is None else "yes" if f["met"] else "[bold red]no[/]"
         noise = f"{number(f['low'])} … {number(f['high'])}"
         reached = f"{number(f['value'])} {f['unit']}"
-        table.add_row(
-            f["work"], f["scene"], f["lighting"], f["measure"], f["bar"] or "", reached, noise, met, f["note"]
-        )
+        table.add_row(*(f[field] for field in where), f["measure"], f["bar"] or "", reached, noise, met, f["note"])
     return table
 
 
 def _times(results: Results) -> Any:
     from rich.table import Table
 
+    where = _where(results)
     table = Table(title="times in milliseconds")
-    for heading in ("work", "scene", "lit per", "contender"):
+    for heading in (*(WORDS[field] for field in where), "contender"):
         table.add_column(heading)
     for heading in ("median", "min … max", "rounds × frames"):
         table.add_column(heading, justify="right")
@@ -105,8 +118,8 @@ def _times(results: Results) -> Any:
     for f in results:
         for name, t in f["times"].items():
             spread = f"{number(1e3 * t['min_s'])} … {number(1e3 * t['max_s'])}"
-            taken = f"{t['rounds']} × {t['frames']}"
-            rows[f["work"], f["scene"], f["lighting"], name] = (number(1e3 * t["median_s"]), spread, taken)
+            taken = f"{t['rounds']} × {t['frames']}" + (f", scaled × {t['scale']:g}" if t["scale"] != 1 else "")
+            rows[(*(f[field] for field in where), name)] = (number(1e3 * t["median_s"]), spread, taken)
     for key, row in rows.items():
         table.add_row(*key, *row)
     return table

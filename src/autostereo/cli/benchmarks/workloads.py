@@ -1,4 +1,4 @@
-"""What the mesh benchmark draws: scenes, rigs and displays that every contender is given alike."""
+"""What the benchmarks draw: scenes, rigs and displays that every contender is given alike."""
 
 from __future__ import annotations
 
@@ -8,15 +8,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from ...display.rig import Rig
 from ...scene.appearance import Material
+from ...scene.mesh import Mesh
 from ...scene.scene import Scene
+from ...scene.volume import Volume
 from ...transforms import apply, apply_normals, as_transform
 
 if TYPE_CHECKING:
     from ...display.display import Display
+    from ...scene.transfer import TransferFunction
 
 Size = tuple[int, int]
 
@@ -38,8 +41,52 @@ def bunny_scene(data: Path, specular: float) -> Scene:
     """The Stanford bunny, `data`/meshes/bun_zipper.ply; not watertight, hence drawn two-sided."""
     from ...io import load
 
-    (mesh,) = load(data / "meshes" / "bun_zipper.ply").objects
+    mesh = the_mesh(load(data / "meshes" / "bun_zipper.ply"))
     return Scene((replace(mesh, material=Material(specular=specular)),))
+
+
+def shells_scene(size: int) -> Scene:
+    """Nested semi-transparent shells, shaded, of size³ voxels (uint8)."""
+    from ...scene.samples import shells
+
+    return Scene((shells(size),))
+
+
+def shells_transfer(dtype: DTypeLike) -> TransferFunction:
+    """The shells' transfer function for values of this type, whose greatest is their greatest."""
+    from ...scene.transfer import TransferFunction
+
+    points = the_volume(shells_scene(16)).transfer.points
+    return TransferFunction(points * (np.iinfo(dtype).max / 255, 1, 1, 1, 1))
+
+
+def step_transfer() -> TransferFunction:
+    """Sharp surfaces in the values of the shells: nothing, then a thin body, then an almost opaque one."""
+    from ...scene.transfer import TransferFunction
+
+    clear, thin, dense = (0.2, 0.5, 0.9, 0.0), (0.2, 0.5, 0.9, 1.0), (0.95, 0.6, 0.2, 20.0)
+    return TransferFunction(np.array([(32, *clear), (32, *thin), (160, *thin), (160, *dense)]))
+
+
+def surfel_scene(count: int) -> Scene:
+    """A cloud of surfels as from a scanner."""
+    from ...scene.samples import surfel_cloud
+
+    return Scene((surfel_cloud(max(100, count)),))
+
+
+def the_mesh(scene: Scene) -> Mesh:
+    """The scene's only object."""
+    (mesh,) = scene.objects
+    assert isinstance(mesh, Mesh)
+    return mesh
+
+
+def the_volume(scene: Scene) -> Volume:
+    """The scene's only object."""
+    (volume,) = scene.objects
+    assert isinstance(volume, Volume)
+    return volume
 
 
 def rig_for(scene: Scene, views: int, size: Size) -> Rig:
@@ -97,7 +144,7 @@ def eyes(rig: Rig) -> NDArray[np.float64]:
 
 def world_arrays(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Positions, unit normals and colours of the scene's one mesh in world space, each (N, 3)."""
-    (mesh,) = scene.objects
+    mesh = the_mesh(scene)
     world_from_object = as_transform(mesh.transform)
     positions = apply(world_from_object, mesh.vertices)
     normals = apply_normals(world_from_object, mesh.shading_normals)
