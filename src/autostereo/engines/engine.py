@@ -23,7 +23,8 @@ class Camera:
     """The centre camera of a rig at one picture size: all that a projection needs (DESIGN section 1).
 
     For an eye-space point (X, Y, d) and a camera at offset vd:
-    x = width/2 + fx·X/d + fx·vd·(1/focal − 1/d),  y = height/2 − fy·(Y − offset_y)/d − fy·offset_y/focal.
+    x = width/2 + fx·X/d + fx·vd·(1/focal − 1/d),  y = height/2 − fy·(Y − offset_y)/d − fy·offset_y/focal;
+    `shift` is added to both.
     """
 
     eye_from_world: NDArray[np.float64]
@@ -34,6 +35,7 @@ class Camera:
     focal: float
     near: float
     offset_y: float = 0.0
+    shift: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)

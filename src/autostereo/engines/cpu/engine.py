@@ -3,98 +3,104 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass, field
-from queue import LifoQueue
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ...scene.mesh import Mesh
+from ...scene.points import Points
 from ...scene.scene import Scene
+from ...scene.volume import Volume
 from ..engine import Draw, Target
 from . import gather
-from .mesh_panel import Block, Panel, draw_panel
-from .mesh_raster import Scratch, Shader, Surface
-from .mesh_reuse import exact_offsets
-from .mesh_setup import (
-    CameraNumbers,
-    clip_near,
-    count_crossing,
-    cull_and_count,
-    fill_bins,
-    light_vertices,
-    project_vertices,
-    turn_normals,
-)
-from .mesh_shade import FLOAT_ROWS, INT_ROWS, STRIDE
-from .mesh_views import draw_views
-from .panel_lines import BUCKET, LinePlan, line_capacity, plan_lines
-from .scene_arrays import SceneArrays, background_word, light_array, scene_arrays
-from .threads import run_rows
-
-PANEL_BYTES = 230_000  # of a panel's samples and their offsets, likewise
-BAND_BYTES = 160_000  # of samples: with what else a band touches it stays in L2
-PANEL_COLUMNS = 2048  # most pixels of a panel's block
-VERTEX_CHUNK = 8192
-_counting = threading.Lock()
+from .memory import Memory
+from .mesh import PreparedMeshes, draw_mesh_panel, draw_mesh_views, prepare_meshes
+from .scene_arrays import background_word
+from .volume import PreparedVolumes, draw_volume_panel, draw_volume_views, prepare_volumes
 
 
 @dataclass(eq=False)
 class Prepared:
-    """A scene ready to draw, with buffers that live from frame to frame (fresh memory is dear)."""
+    """A scene ready to draw, by kind of primitive, with memory that lives from frame to frame."""
 
     scene: Scene
-    arrays: SceneArrays
-    face_ids: NDArray[np.int32]
-    buffers: dict[str, NDArray[Any]] = field(default_factory=dict)
-    pools: dict[tuple[Any, ...], Pool] = field(default_factory=dict)
-    plan: tuple[Any, ...] | None = None
+    meshes: PreparedMeshes | None
+    volumes: PreparedVolumes | None
+    memory: Memory = field(default_factory=Memory)
     lock: threading.Lock = field(default_factory=threading.Lock)
-
-    def lines(self, draw: Draw) -> LinePlan:
-        """The plan of the panel's lines, that of the frame before if it still fits."""
-        assert draw.viewmap is not None
-        key = (draw.viewmap, draw.camera.width, draw.flip_x, draw.offsets.tobytes())
-        if self.plan is None or self.plan[0] != key:
-            self.plan = key, plan_lines(draw.viewmap, draw.camera.width, draw.flip_x, draw.offsets)
-        return self.plan[1]
-
-    def pool(self, key: tuple[Any, ...], make: Any) -> Pool:
-        """Memory for tasks of this kind and size; what another size needed is let go."""
-        if key not in self.pools:
-            for old in [k for k in self.pools if k[0] == key[0]]:
-                del self.pools[old]
-            self.pools[key] = Pool(make)
-        return self.pools[key]
-
-    def buffer(self, name: str, shape: tuple[int, ...], dtype: type) -> NDArray[Any]:
-        """An uninitialised array of this shape, in memory kept under `name`."""
-        count = int(np.prod(shape))
-        held = self.buffers.get(name)
-        if held is None or held.size < count or held.dtype != dtype:
-            held = self.buffers[name] = np.empty(count, dtype)
-        return held[:count].reshape(shape)
 
 
 class CpuEngine:
-    """Draws meshes; see engines.engine.Engine."""
+    """Draws meshes and volumes; see engines.engine.Engine.
+
+    Meshes alone are drawn into finished pictures. Everything else is drawn stage by stage over pictures and
+    depths: meshes, then volumes, whose rays end at the depth of what is opaque.
+    """
 
     name = "cpu"
     methods = ("single-pass", "n-pass", "n-pass-subres")
 
     def prepare(self, scene: Scene) -> Prepared:
-        """Gather the scene's meshes, textures and materials."""
-        arrays = scene_arrays(scene)
-        return Prepared(scene, arrays, np.arange(len(arrays.faces), dtype=np.int32))
+        """Turn every kind of primitive into arrays."""
+        meshes = [item for item in scene.objects if isinstance(item, Mesh)]
+        volumes = [item for item in scene.objects if isinstance(item, Volume)]
+        return Prepared(
+            scene,
+            prepare_meshes(scene, meshes) if meshes else None,
+            prepare_volumes(scene, volumes) if volumes else None,
+        )
 
     def draw(self, prepared: Prepared, draw: Draw, target: Target) -> None:
         """Draw a stack of views, or straight to the panel."""
         with prepared.lock:
-            if draw.viewmap is None:
-                self._draw_views(prepared, draw, target)
+            if prepared.volumes is None and prepared.meshes is not None:
+                one = draw_mesh_views if draw.viewmap is None else draw_mesh_panel
+                one(prepared.meshes, draw, target, prepared.memory)
+            elif draw.options.samples == 1:
+                self._draw_stages(prepared, draw, target)
             else:
-                self._draw_panel(prepared, draw, target)
+                self._draw_samples(prepared, draw, target)
+
+    def _draw_samples(self, prepared: Prepared, draw: Draw, target: Target) -> None:
+        """Draw sample after sample of every pixel, and take their mean."""
+        side = round(draw.options.samples**0.5)
+        sums = np.zeros(target.color.shape, np.uint16)
+        nearest = None if target.depth is None else np.full(target.depth.shape, np.inf, np.float32)
+        options = replace(draw.options, samples=1)
+        for k in range(side * side):
+            x, y = (k % side + 0.5) / side, (k // side + 0.5) / side
+            camera = replace(draw.camera, shift=(0.5 - x, 0.5 - y))
+            self._draw_stages(prepared, replace(draw, camera=camera, options=options), target)
+            sums += target.color
+            if nearest is not None:
+                np.minimum(nearest, target.depth, out=nearest)
+        target.color[...] = (sums + side * side // 2) // (side * side)
+        if nearest is not None:
+            target.depth[...] = nearest
+
+    def _draw_stages(self, prepared: Prepared, draw: Draw, target: Target) -> None:
+        panel = draw.viewmap is not None
+        shape = target.color.shape if panel else target.color.shape[:3]
+        opaque = prepared.meshes is not None
+        depth = target.depth
+        if depth is None and opaque:
+            depth = prepared.memory.buffer("depth", shape, np.float32)
+        if prepared.meshes is not None:
+            stage = Target(target.color, depth)
+            one = draw_mesh_panel if panel else draw_mesh_views
+            one(prepared.meshes, draw, stage, prepared.memory)
+            target.covered, target.reused = target.covered + stage.covered, target.reused + stage.reused
+        else:
+            background = np.array([background_word(prepared.scene)]).view(np.uint8)
+            target.color[...] = background[: target.color.shape[-1]]
+            if depth is not None:
+                depth[...] = np.inf
+        if prepared.volumes is not None:
+            ends = np.empty((0, 0, 0), np.float32) if depth is None else depth
+            two = draw_volume_panel if panel else draw_volume_views
+            two(prepared.volumes, draw, target.color, ends, prepared.memory)
 
     def interlace(self, views: NDArray[np.uint8], draw: Draw, out: NDArray[np.uint8]) -> None:
         """Gather a panel from its V views."""
@@ -112,234 +118,3 @@ class CpuEngine:
         """Gather a panel of `size` from a quilt of views of another size, bilinearly."""
         assert draw.viewmap is not None
         return gather.weave(quilt, grid, draw.viewmap, size, "linear", (draw.flip_x, draw.flip_y))
-
-    def _draw_views(self, prepared: Prepared, draw: Draw, target: Target) -> None:
-        views, height, width, _ = target.color.shape
-        side = round(draw.options.samples**0.5)
-        block, rows_per_band = view_blocks(views, width)
-        blocks = -(-width // block)
-        surface, camera, shader = surface_at(prepared, draw, (rows_per_band, block, blocks))
-        samples = rows_per_band * views * block
-        sums = 4 * samples if side > 1 else 0
-        exact = (len(shader.exact), width)
-        pool = prepared.pool(("views", samples, sums, exact), lambda: new_scratch(samples, sums, exact))
-        offsets = np.pad(draw.offsets.astype(np.float32), (0, 15), mode="edge")
-        background = background_word(prepared.scene)
-        out = target.color.view(np.int32).reshape(views, height, width)
-        depth = np.empty((0, 0, 0), np.float32) if target.depth is None else target.depth
-
-        def task(first: int, end: int) -> None:
-            with pool as scratch:
-                bins = (first, end, rows_per_band, blocks, block)
-                draw_views(bins, surface, camera, shader, offsets, background, side, scratch, out, depth)
-                count_samples(target, scratch)
-
-        run_rows(-(-height // rows_per_band) * blocks, task)
-
-    def _draw_panel(self, prepared: Prepared, draw: Draw, target: Target) -> None:
-        height, width, _ = target.color.shape
-        plan = prepared.lines(draw)
-        columns, rows = panel_blocks(width)
-        blocks = -(-width // columns)
-        surface, camera, shader = surface_at(prepared, draw, (rows, columns, blocks))
-        side = round(draw.options.samples**0.5)
-        panel = Panel(plan, draw.flip_x, draw.flip_y, draw.options.sampling == "subpixel")
-        samples, capacity = rows * columns * 3, line_capacity(plan, columns)
-        sums = samples if side > 1 else 0
-        exact = (len(shader.exact), width)
-        pool = prepared.pool(
-            ("panel", rows, columns, capacity, sums, exact),
-            lambda: (new_block(rows, columns, capacity), new_scratch(samples, sums, exact)),
-        )
-        background = background_word(prepared.scene)
-
-        def task(first: int, end: int) -> None:
-            with pool as (block, scratch):
-                bins = (first, end, rows, blocks, columns)
-                draw_panel(
-                    bins, surface, camera, shader, panel, block, background, side, scratch, target.color
-                )
-                count_samples(target, scratch)
-
-        run_rows(-(-height // rows) * blocks, task)
-
-
-class Pool:
-    """Memory for one task at a time: made when none is free, kept for the next task."""
-
-    def __init__(self, make: Any) -> None:
-        self._make, self._free = make, LifoQueue[Any]()
-        self._local = threading.local()
-
-    def __enter__(self) -> Any:
-        try:
-            self._local.item = self._free.get_nowait()
-        except Exception:
-            self._local.item = self._make()
-        return self._local.item
-
-    def __exit__(self, *_: object) -> None:
-        self._free.put(self._local.item)
-
-
-def new_scratch(samples: int, sums: int, exact: tuple[int, int]) -> Scratch:
-    """One thread's memory: a band of `samples`, accumulators for sub-samples, colours of `exact` views × width."""
-    words = np.zeros(STRIDE, np.int64)
-    return Scratch(
-        np.zeros(samples, np.int64),
-        np.zeros(32, np.float32),
-        np.zeros(FLOAT_ROWS * STRIDE, np.float32),
-        np.zeros(INT_ROWS * STRIDE, np.int32),
-        words,
-        words.view(np.int32),
-        np.zeros(sums, np.uint16),
-        np.zeros(exact[0] * exact[1], np.int32),
-        np.zeros((3, exact[0]), np.int32),
-        np.zeros(2, np.int64),
-    )
-
-
-def count_samples(target: Target, scratch: Scratch) -> None:
-    """Move a thread's counters to the target's."""
-    with _counting:
-        target.covered += int(scratch.counts[0])
-        target.reused += int(scratch.counts[1])
-    scratch.counts[:] = 0
-
-
-def new_block(rows: int, columns: int, capacity: int) -> Block:
-    """One thread's memory for a panel's block whose rows have at most `capacity` lines."""
-    return Block(
-        np.zeros(rows * columns * 3, np.float32),
-        np.zeros((rows, 3, capacity), np.float32),
-        np.zeros((rows, capacity), np.int32),
-        np.zeros((rows, (columns >> BUCKET) + 2), np.int32),
-        np.zeros((3, capacity), np.float32),
-        np.zeros(capacity, np.int32),
-        np.zeros(columns, np.float64),
-    )
-
-
-def panel_blocks(width: int) -> tuple[int, int]:
-    """Columns of a panel's block and rows of a band for which samples and offsets stay in cache."""
-    blocks = -(-width // PANEL_COLUMNS)
-    columns = (-(-width // blocks) + 15) // 16 * 16
-    return columns, int(np.clip(PANEL_BYTES // (36 * columns), 1, 16))
-
-
-def view_blocks(views: int, width: int) -> tuple[int, int]:
-    """Columns of a block and rows of a band for which the samples of all views stay in cache."""
-    columns = max(64, BAND_BYTES // (8 * views))
-    blocks = -(-width // columns)
-    block = (-(-width // blocks) + 7) // 8 * 8
-    return block, int(np.clip(BAND_BYTES // (8 * views * block), 1, 16))
-
-
-def surface_at(prepared: Prepared, draw: Draw, bins: tuple[int, int, int]) -> tuple[Surface, CameraNumbers, Shader]:
-    """Project, light, clip, cull and bin the scene's triangles; bins = (rows per band, columns per block, blocks)."""
-    arrays, camera, options = prepared.arrays, draw.camera, draw.options
-    numbers = CameraNumbers(
-        float(camera.width), float(camera.height), camera.fx, camera.fy, camera.focal, camera.near, camera.offset_y
-    )
-    count = len(arrays.positions)
-    e = np.ascontiguousarray(camera.eye_from_world)
-    per_sample = options.lighting == "sample"
-    lights = light_array(prepared.scene, camera)
-    two_sided = bool(arrays.materials[:, 4].any())
-    vertices = prepared.buffer("vertices", (count, 3), np.float64)
-    attributes = prepared.buffer("attributes", (count, 12 if two_sided and not per_sample else 6), np.float32)
-
-    behind: list[int] = []
-
-    def vertex_stage(first: int, last: int) -> None:
-        behind.append(project_vertices(first, last, arrays.positions, e, numbers, vertices))
-        if per_sample:
-            turn_normals(first, last, arrays.normals, arrays.colors, e, attributes)
-        else:
-            light_vertices(first, last, arrays, e, numbers, lights, attributes)
-
-    run_rows(count, vertex_stage, VERTEX_CHUNK)
-    faces, face_ids, uv = arrays.faces, prepared.face_ids, arrays.uv
-    if any(behind):
-        faces, face_ids, vertices, attributes, uv = _clipped(
-            arrays, e, numbers, (faces, face_ids, vertices, attributes, uv)
-        )
-    side = round(options.samples**0.5)
-    bands = (bins[0], 0.5 / side, 1.0 - 0.5 / side, float(bins[1]), bins[2])
-    triangles, bin_start, binned = _binned(prepared, (faces, face_ids, vertices), numbers, draw.culling, bands)
-    columns = 6 if per_sample or arrays.materials[:, 2].any() else 3
-    surface = Surface(
-        vertices, attributes, uv, triangles, bin_start, binned, arrays.face_material, arrays.materials, columns
-    )
-    own_eye = np.float32(options.shading != "center")
-    points = bool(lights[:, 0].any())
-    exact = exact_offsets(draw.offsets) if options.shading == "reuse" else np.empty(0, np.float32)
-    shader = Shader(
-        lights,
-        arrays.texels,
-        arrays.texture_levels,
-        arrays.level_count,
-        per_sample,
-        own_eye,
-        points,
-        exact,
-        np.float32(camera.fx / camera.focal),
-    )
-    return surface, numbers, shader
-
-
-def _clipped(arrays: SceneArrays, e: Any, camera: CameraNumbers, held: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Triangles cut at the near plane, in arrays with room for the new vertices."""
-    faces, face_ids, vertices, attributes, uv = held
-    crossing = count_crossing(faces, vertices)
-    room = 2 * crossing
-
-    def grown(a: NDArray[Any]) -> NDArray[Any]:
-        return np.concatenate([a, np.zeros((room, a.shape[1]), a.dtype)]) if len(a) else a
-
-    vertices, attributes, uv = grown(vertices), grown(attributes), grown(uv)
-    out_faces = np.empty((len(faces) + crossing, 3), np.int32)
-    out_ids = np.empty(len(out_faces), np.int32)
-    count = clip_near(faces, face_ids, arrays.positions, e, camera, vertices, attributes, uv, out_faces, out_ids)
-    return out_faces[:count], out_ids[:count], vertices, attributes, uv
-
-
-def _binned(
-    prepared: Prepared, mesh: tuple[Any, ...], camera: CameraNumbers, culling: tuple[float, float], bands: Any
-) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.int32]]:
-    """Visible triangles, and the triangles of each band in the order of faces."""
-    faces, face_ids, vertices = mesh
-    chunks = max(1, min(2 * numba.get_num_threads(), len(faces) // 4096))
-    edges = np.linspace(0, len(faces), chunks + 1).astype(np.int64)
-    count_bands = -(-int(camera.height) // bands[0]) * bands[4]
-    counts = np.zeros((chunks, count_bands), np.int64)
-    kept = np.zeros(chunks, np.int64)
-    triangles = prepared.buffer("triangles", (max(len(faces), 1), 6), np.int32)
-
-    def cull(first: int, last: int) -> None:
-        for c in range(first, last):
-            kept[c] = cull_and_count(
-                (edges[c], edges[c + 1]),
-                faces,
-                face_ids,
-                vertices,
-                prepared.arrays,
-                camera,
-                culling,
-                bands,
-                triangles,
-                counts[c],
-            )
-
-    run_rows(chunks, cull, 1)
-    bin_start = np.zeros(count_bands + 1, np.int64)
-    np.cumsum(counts.sum(axis=0), out=bin_start[1:])
-    cursors = bin_start[:-1] + np.cumsum(counts, axis=0) - counts
-    bins = prepared.buffer("bins", (max(int(bin_start[-1]), 1),), np.int32)
-
-    def fill(first: int, last: int) -> None:
-        for c in range(first, last):
-            fill_bins(edges[c], kept[c], triangles, vertices, camera.height, bands, cursors[c], bins)
-
-    run_rows(chunks, fill, 1)
-    return triangles, bin_start, bins

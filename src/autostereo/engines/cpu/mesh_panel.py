@@ -330,11 +330,25 @@ def store_background(target, step, count, background, out):
         out[a + np.uint64(2)] = np.uint8((background >> 16) & 255)
 
 
+@inlined
+def store_depth(row, columns, drawn, base, plane, focal, flip, band, depth):
+    """Write eye depth of pixels `columns` of a row, inf where empty; depth is (H, W, 3)."""
+    width = depth.shape[1]
+    for x in range(columns[0], columns[1]):
+        column = width - 1 - x if flip else x
+        for c in range(3):
+            if drawn[0] <= x < drawn[1]:
+                a = np.uint64(base + c * plane + x - drawn[0])
+                depth[row, column, c] = focal / np.int32(band[a] >> np.int64(32)).view(np.float32)
+            else:
+                depth[row, column, c] = np.float32(np.inf)
+
+
 @kernel
-def draw_panel(bins, surface, camera, shader, panel, block, background, side, scratch, out):
+def draw_panel(bins, surface, camera, shader, panel, block, background, side, scratch, out, depth):
     """Draw bins (first, end, rows per band, blocks a row, columns per block) into out (H, W, 3) uint8.
 
-    side² samples a sub-pixel.
+    side² samples a sub-pixel; depth (H, W, 3) float32 of the first, or of no size when it is not wanted.
     """
     height, width, _ = out.shape
     flat, plan, plane = out.reshape(-1), panel.plan, bins[4]
@@ -371,6 +385,8 @@ def draw_panel(bins, surface, camera, shader, panel, block, background, side, sc
             base = (r - rows[0]) * 3 * plane + drawn[0] - first
             if side > 1:
                 take_means(count, base, plane, side * side, scratch.band, scratch.sums)
+            if depth.size > 0:
+                store_depth(row, columns, drawn, base, plane, np.float32(camera.focal), panel.flip_x, scratch.band, depth)
             start, end = row * width * 3, (row + 1) * width * 3 - 3
             begin = end if panel.flip_x else start
             store_background(begin + step * columns[0], step, drawn[0] - columns[0], background, flat)

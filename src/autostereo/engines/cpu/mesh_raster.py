@@ -218,10 +218,10 @@ def shade(n, shader, material, side, row, gradient, segment, lists, ints):
 @inlined
 def row_geometry(y, camera):
     """What `locate` needs to know of row y."""
-    slope = (0.5 * camera.height - y) / camera.fy - camera.offset_y / camera.focal
+    slope = (camera.centre_y - y) / camera.fy - camera.offset_y / camera.focal
     return (
         np.float32(1.0 / camera.fx),
-        np.float32(0.5 * camera.width),
+        np.float32(camera.centre_x),
         np.float32(1.0 / camera.focal),
         np.float32(slope),
         np.float32(camera.offset_y),

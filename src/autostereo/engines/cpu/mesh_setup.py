@@ -10,13 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..engine import Camera
 from .jit import kernel
 
 LIGHT_POINT = 1.0
 
 
 class CameraNumbers(NamedTuple):
-    """The centre camera as plain numbers; see engines.engine.Camera."""
+    """The centre camera as plain numbers; see engines.engine.Camera. (centre_x, centre_y): where it looks."""
 
     width: float
     height: float
@@ -25,6 +26,23 @@ class CameraNumbers(NamedTuple):
     focal: float
     near: float
     offset_y: float
+    centre_x: float
+    centre_y: float
+
+
+def camera_numbers(camera: Camera) -> CameraNumbers:
+    """Return a camera's numbers."""
+    return CameraNumbers(
+        float(camera.width),
+        float(camera.height),
+        camera.fx,
+        camera.fy,
+        camera.focal,
+        camera.near,
+        camera.offset_y,
+        0.5 * camera.width + camera.shift[0],
+        0.5 * camera.height + camera.shift[1],
+    )
 
 
 @kernel
@@ -45,9 +63,9 @@ def project_vertices(first, last, positions, eye_from_world, camera, vertices):
             behind += 1
             continue
         inverse = 1.0 / depth
-        vertices[i, 0] = 0.5 * camera.width + camera.fx * x * inverse
+        vertices[i, 0] = camera.centre_x + camera.fx * x * inverse
         vertices[i, 1] = (
-            0.5 * camera.height
+            camera.centre_y
             - camera.fy * (y - camera.offset_y) * inverse
             - camera.fy * camera.offset_y / camera.focal
         )
@@ -153,9 +171,9 @@ def clip_near(faces, face_ids, positions, eye_from_world, camera, vertices, attr
                 t = (ad - camera.near) / (ad - bd)
                 inverse = 1.0 / camera.near
                 x, y = ax + t * (bx - ax), ay + t * (by - ay)
-                vertices[new, 0] = 0.5 * camera.width + camera.fx * x * inverse
+                vertices[new, 0] = camera.centre_x + camera.fx * x * inverse
                 vertices[new, 1] = (
-                    0.5 * camera.height
+                    camera.centre_y
                     - camera.fy * (y - camera.offset_y) * inverse
                     - camera.fy * camera.offset_y / camera.focal
                 )

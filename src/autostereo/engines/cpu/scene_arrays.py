@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...scene.appearance import PointLight
+from ...scene.mesh import Mesh
 from ...scene.scene import Scene
 from ...transforms import apply, apply_normals
 from ..engine import Camera
@@ -74,9 +76,8 @@ def _pack_textures(images: list[NDArray[np.uint8]]) -> tuple[NDArray, NDArray, N
     return np.concatenate(flat) if flat else np.zeros(1, np.uint32), table, count
 
 
-def scene_arrays(scene: Scene) -> SceneArrays:
-    """Gather the meshes of a scene; mirroring transforms flip the winding, equal textures are stored once."""
-    meshes = scene.objects
+def scene_arrays(meshes: Sequence[Mesh]) -> SceneArrays:
+    """Gather meshes; mirroring transforms flip the winding, equal textures are stored once."""
     materials = np.zeros((len(meshes), 8), dtype=np.float32)
     images: dict[int, tuple[int, NDArray[np.uint8]]] = {}
     parts: dict[str, list[NDArray]] = {name: [] for name in ("p", "n", "c", "t", "vm", "f", "fm")}

@@ -1,0 +1,283 @@
+"""Meshes on the cpu engine: from a scene to kernels."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scene.mesh import Mesh
+from ...scene.scene import Scene
+from ..engine import Draw, Target
+from .memory import Memory
+from .mesh_panel import Block, Panel, draw_panel
+from .mesh_raster import Scratch, Shader, Surface
+from .mesh_reuse import exact_offsets
+from .mesh_setup import (
+    CameraNumbers,
+    camera_numbers,
+    clip_near,
+    count_crossing,
+    cull_and_count,
+    fill_bins,
+    light_vertices,
+    project_vertices,
+    turn_normals,
+)
+from .mesh_shade import FLOAT_ROWS, INT_ROWS, STRIDE
+from .mesh_views import draw_views
+from .panel_lines import BUCKET, LinePlan, line_capacity, plan_lines
+from .scene_arrays import SceneArrays, background_word, light_array, scene_arrays
+from .threads import run_rows
+
+PANEL_BYTES = 230_000  # of a panel's samples and their offsets: with what else a band touches they stay in L2
+BAND_BYTES = 160_000  # of the samples of views, likewise
+PANEL_COLUMNS = 2048  # most pixels of a panel's block
+VERTEX_CHUNK = 8192
+_counting = threading.Lock()
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedMeshes:
+    """The meshes of a scene, ready to be drawn."""
+
+    scene: Scene
+    arrays: SceneArrays
+    face_ids: NDArray[np.int32]
+
+
+def prepare_meshes(scene: Scene, meshes: list[Mesh]) -> PreparedMeshes:
+    """Gather meshes, textures and materials."""
+    arrays = scene_arrays(meshes)
+    return PreparedMeshes(scene, arrays, np.arange(len(arrays.faces), dtype=np.int32))
+
+
+def panel_lines(draw: Draw, memory: Memory) -> LinePlan:
+    """The plan of a panel's lines, that of the frame before if it still fits."""
+    viewmap, width, flip, offsets = draw.viewmap, draw.camera.width, draw.flip_x, draw.offsets
+    assert viewmap is not None
+    key = (viewmap, width, flip, offsets.tobytes())
+    return memory.remember("lines", key, lambda: plan_lines(viewmap, width, flip, offsets))
+
+
+def draw_mesh_views(prepared: PreparedMeshes, draw: Draw, target: Target, memory: Memory) -> None:
+    """Draw a stack of views: every pixel of the target, and its depth if it has one."""
+    views, height, width, _ = target.color.shape
+    side = round(draw.options.samples**0.5)
+    block, rows_per_band = view_blocks(views, width)
+    blocks = -(-width // block)
+    surface, camera, shader = surface_at(prepared, draw, (rows_per_band, block, blocks), memory)
+    samples = rows_per_band * views * block
+    sums = 4 * samples if side > 1 else 0
+    exact = (len(shader.exact), width)
+    pool = memory.pool(("views", samples, sums, exact), lambda: new_scratch(samples, sums, exact))
+    offsets = np.pad(draw.offsets.astype(np.float32), (0, 15), mode="edge")
+    background = background_word(prepared.scene)
+    out = target.color.view(np.int32).reshape(views, height, width)
+    depth = np.empty((0, 0, 0), np.float32) if target.depth is None else target.depth
+
+    def task(first: int, end: int) -> None:
+        with pool as scratch:
+            bins = (first, end, rows_per_band, blocks, block)
+            draw_views(bins, surface, camera, shader, offsets, background, side, scratch, out, depth)
+            count_samples(target, scratch)
+
+    run_rows(-(-height // rows_per_band) * blocks, task)
+
+
+def draw_mesh_panel(prepared: PreparedMeshes, draw: Draw, target: Target, memory: Memory) -> None:
+    """Draw every pixel of a panel, and its depth (H, W, 3) if the target has one."""
+    height, width, _ = target.color.shape
+    plan = panel_lines(draw, memory)
+    columns, rows = panel_blocks(width)
+    blocks = -(-width // columns)
+    surface, camera, shader = surface_at(prepared, draw, (rows, columns, blocks), memory)
+    side = round(draw.options.samples**0.5)
+    panel = Panel(plan, draw.flip_x, draw.flip_y, draw.options.sampling == "subpixel")
+    samples, capacity = rows * columns * 3, line_capacity(plan, columns)
+    sums = samples if side > 1 else 0
+    exact = (len(shader.exact), width)
+    pool = memory.pool(
+        ("panel", rows, columns, capacity, sums, exact),
+        lambda: (new_block(rows, columns, capacity), new_scratch(samples, sums, exact)),
+    )
+    background = background_word(prepared.scene)
+    depth = np.empty((0, 0, 0), np.float32) if target.depth is None else target.depth
+
+    def task(first: int, end: int) -> None:
+        with pool as (block, scratch):
+            bins = (first, end, rows, blocks, columns)
+            draw_panel(
+                bins, surface, camera, shader, panel, block, background, side, scratch, target.color, depth
+            )
+            count_samples(target, scratch)
+
+    run_rows(-(-height // rows) * blocks, task)
+
+
+def new_scratch(samples: int, sums: int, exact: tuple[int, int]) -> Scratch:
+    """One thread's memory: a band of `samples`, accumulators for sub-samples, colours of `exact` views × width."""
+    words = np.zeros(STRIDE, np.int64)
+    return Scratch(
+        np.zeros(samples, np.int64),
+        np.zeros(32, np.float32),
+        np.zeros(FLOAT_ROWS * STRIDE, np.float32),
+        np.zeros(INT_ROWS * STRIDE, np.int32),
+        words,
+        words.view(np.int32),
+        np.zeros(sums, np.uint16),
+        np.zeros(exact[0] * exact[1], np.int32),
+        np.zeros((3, exact[0]), np.int32),
+        np.zeros(2, np.int64),
+    )
+
+
+def count_samples(target: Target, scratch: Scratch) -> None:
+    """Move a thread's counters to the target's."""
+    with _counting:
+        target.covered += int(scratch.counts[0])
+        target.reused += int(scratch.counts[1])
+    scratch.counts[:] = 0
+
+
+def new_block(rows: int, columns: int, capacity: int) -> Block:
+    """One thread's memory for a panel's block whose rows have at most `capacity` lines."""
+    return Block(
+        np.zeros(rows * columns * 3, np.float32),
+        np.zeros((rows, 3, capacity), np.float32),
+        np.zeros((rows, capacity), np.int32),
+        np.zeros((rows, (columns >> BUCKET) + 2), np.int32),
+        np.zeros((3, capacity), np.float32),
+        np.zeros(capacity, np.int32),
+        np.zeros(columns, np.float64),
+    )
+
+
+def panel_blocks(width: int) -> tuple[int, int]:
+    """Columns of a panel's block and rows of a band for which samples and offsets stay in cache."""
+    blocks = -(-width // PANEL_COLUMNS)
+    columns = (-(-width // blocks) + 15) // 16 * 16
+    return columns, int(np.clip(PANEL_BYTES // (36 * columns), 1, 16))
+
+
+def view_blocks(views: int, width: int) -> tuple[int, int]:
+    """Columns of a block and rows of a band for which the samples of all views stay in cache."""
+    columns = max(64, BAND_BYTES // (8 * views))
+    blocks = -(-width // columns)
+    block = (-(-width // blocks) + 7) // 8 * 8
+    return block, int(np.clip(BAND_BYTES // (8 * views * block), 1, 16))
+
+
+def surface_at(
+    prepared: PreparedMeshes, draw: Draw, bins: tuple[int, int, int], memory: Memory
+) -> tuple[Surface, CameraNumbers, Shader]:
+    """Project, light, clip, cull and bin the scene's triangles; bins = (rows per band, columns per block, blocks)."""
+    arrays, camera, options = prepared.arrays, draw.camera, draw.options
+    numbers = camera_numbers(camera)
+    count = len(arrays.positions)
+    e = np.ascontiguousarray(camera.eye_from_world)
+    per_sample = options.lighting == "sample"
+    lights = light_array(prepared.scene, camera)
+    two_sided = bool(arrays.materials[:, 4].any())
+    vertices = memory.buffer("vertices", (count, 3), np.float64)
+    attributes = memory.buffer("attributes", (count, 12 if two_sided and not per_sample else 6), np.float32)
+
+    behind: list[int] = []
+
+    def vertex_stage(first: int, last: int) -> None:
+        behind.append(project_vertices(first, last, arrays.positions, e, numbers, vertices))
+        if per_sample:
+            turn_normals(first, last, arrays.normals, arrays.colors, e, attributes)
+        else:
+            light_vertices(first, last, arrays, e, numbers, lights, attributes)
+
+    run_rows(count, vertex_stage, VERTEX_CHUNK)
+    faces, face_ids, uv = arrays.faces, prepared.face_ids, arrays.uv
+    if any(behind):
+        faces, face_ids, vertices, attributes, uv = _clipped(
+            arrays, e, numbers, (faces, face_ids, vertices, attributes, uv)
+        )
+    side = round(options.samples**0.5)
+    bands = (bins[0], 0.5 / side, 1.0 - 0.5 / side, float(bins[1]), bins[2])
+    triangles, bin_start, binned = _binned((prepared.arrays, memory), (faces, face_ids, vertices), numbers, draw.culling, bands)
+    columns = 6 if per_sample or arrays.materials[:, 2].any() else 3
+    surface = Surface(
+        vertices, attributes, uv, triangles, bin_start, binned, arrays.face_material, arrays.materials, columns
+    )
+    own_eye = np.float32(options.shading != "center")
+    points = bool(lights[:, 0].any())
+    exact = exact_offsets(draw.offsets) if options.shading == "reuse" else np.empty(0, np.float32)
+    shader = Shader(
+        lights,
+        arrays.texels,
+        arrays.texture_levels,
+        arrays.level_count,
+        per_sample,
+        own_eye,
+        points,
+        exact,
+        np.float32(camera.fx / camera.focal),
+    )
+    return surface, numbers, shader
+
+
+def _clipped(arrays: SceneArrays, e: Any, camera: CameraNumbers, held: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Triangles cut at the near plane, in arrays with room for the new vertices."""
+    faces, face_ids, vertices, attributes, uv = held
+    crossing = count_crossing(faces, vertices)
+    room = 2 * crossing
+
+    def grown(a: NDArray[Any]) -> NDArray[Any]:
+        return np.concatenate([a, np.zeros((room, a.shape[1]), a.dtype)]) if len(a) else a
+
+    vertices, attributes, uv = grown(vertices), grown(attributes), grown(uv)
+    out_faces = np.empty((len(faces) + crossing, 3), np.int32)
+    out_ids = np.empty(len(out_faces), np.int32)
+    count = clip_near(faces, face_ids, arrays.positions, e, camera, vertices, attributes, uv, out_faces, out_ids)
+    return out_faces[:count], out_ids[:count], vertices, attributes, uv
+
+
+def _binned(
+    held: tuple[SceneArrays, Memory], mesh: tuple[Any, ...], camera: CameraNumbers, culling: tuple[float, float], bands: Any
+) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.int32]]:
+    """Visible triangles, and the triangles of each band in the order of faces."""
+    arrays, memory = held
+    faces, face_ids, vertices = mesh
+    chunks = max(1, min(2 * numba.get_num_threads(), len(faces) // 4096))
+    edges = np.linspace(0, len(faces), chunks + 1).astype(np.int64)
+    count_bands = -(-int(camera.height) // bands[0]) * bands[4]
+    counts = np.zeros((chunks, count_bands), np.int64)
+    kept = np.zeros(chunks, np.int64)
+    triangles = memory.buffer("triangles", (max(len(faces), 1), 6), np.int32)
+
+    def cull(first: int, last: int) -> None:
+        for c in range(first, last):
+            kept[c] = cull_and_count(
+                (edges[c], edges[c + 1]),
+                faces,
+                face_ids,
+                vertices,
+                arrays,
+                camera,
+                culling,
+                bands,
+                triangles,
+                counts[c],
+            )
+
+    run_rows(chunks, cull, 1)
+    bin_start = np.zeros(count_bands + 1, np.int64)
+    np.cumsum(counts.sum(axis=0), out=bin_start[1:])
+    cursors = bin_start[:-1] + np.cumsum(counts, axis=0) - counts
+    bins = memory.buffer("bins", (max(int(bin_start[-1]), 1),), np.int32)
+
+    def fill(first: int, last: int) -> None:
+        for c in range(first, last):
+            fill_bins(edges[c], kept[c], triangles, vertices, camera.height, bands, cursors[c], bins)
+
+    run_rows(chunks, fill, 1)
+    return triangles, bin_start, bins

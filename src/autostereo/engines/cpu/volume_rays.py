@@ -1,0 +1,217 @@
+"""Volumes along rays of their own: one view, or sub-pixels one by one (`volume="exact"`, n-pass, every isosurface).
+
+Rays are handled in blocks of 64, whose state lies in rows a fixed distance apart, so that every loop is SIMD (see
+mesh_shade). A slab is the stretch of a ray between two slices; its scalars at both ends are looked up in the table of
+pre-integrated slabs (Engel, Kraus and Ertl 2001).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .jit import inlined, kernel
+from .mesh_shade import exp2_fast
+from .volume_sample import SLABS, any_marked
+
+RAYS = 64  # of a block
+ROW = 80  # distance of a block's rows
+(
+    ORIGIN, TURN, ENTER, LEAVE, LENGTH, T, R, G, B, HALF, FRONT, BACK, OPTICAL, SHARE,
+    PART, LEFT, RIGHT, FRONT_LIGHT, BACK_LIGHT,
+) = (np.uint64(k * ROW) for k in (*range(18), 23))  # fmt: skip
+BLOCK_ROWS = 29
+ZERO, ONE, HALF_WAY = np.float32(0.0), np.float32(1.0), np.float32(0.5)
+TEN_BITS, COLOR_STEP = np.int32(1023), np.float32(1.0 / 1023.0)
+OPAQUE = np.float32(1.0 / 512.0)
+
+
+@inlined
+def ray_stretch(n, base, cut, row, near, rays):
+    """Depths where rays of a block enter and leave what is seen of a volume; LEAVE holds where they end.
+
+    ORIGIN is the X of a ray's eye, TURN its X per depth.
+    """
+    for i in range(n):
+        rays[base + ENTER + i] = np.float32(near)
+    m, slope, lens = cut.index, row[0], row[1]
+    for h in range(cut.halves.shape[0]):
+        a, b, c, d = cut.halves[h, 0], cut.halves[h, 1], cut.halves[h, 2], cut.halves[h, 3]
+        gx = np.float32(a * m[0, 0] + b * m[1, 0] + c * m[2, 0])
+        gy = a * m[0, 1] + b * m[1, 1] + c * m[2, 1]
+        gz = a * m[0, 2] + b * m[1, 2] + c * m[2, 2]
+        at_eye = np.float32(a * m[0, 3] + b * m[1, 3] + c * m[2, 3] + d + gy * lens)
+        deeper = np.float32(gz + gy * slope)
+        for i in range(n):
+            start = at_eye + gx * rays[base + ORIGIN + i]
+            step = deeper + gx * rays[base + TURN + i]
+            crossing = -start / (step if step != ZERO else ONE)
+            enter, leave = rays[base + ENTER + i], rays[base + LEAVE + i]
+            enter = max(enter, crossing) if step > ZERO else enter
+            leave = min(leave, crossing) if step < ZERO else leave
+            rays[base + ENTER + i] = enter
+            rays[base + LEAVE + i] = leave if (step != ZERO) | (start >= ZERO) else np.float32(-1.0)
+
+
+@inlined
+def locate_rays(n, base, depth, cut, samples, rays, index):
+    """Where a slice's samples lie beside the rays: the left one, and the part beyond it in PART."""
+    last, inverse = np.float32(samples - 2), np.float32(1.0 / cut.step)
+    first, d = np.float32(-cut.first / cut.step), np.float32(depth)
+    for i in range(n):
+        at = (rays[base + ORIGIN + i] + d * rays[base + TURN + i]) * inverse + first
+        at = min(max(at, ZERO), last)
+        k = np.floor(at)
+        rays[base + PART + i] = at - k
+        index[i] = np.int32(k)
+
+
+@inlined
+def sample_rays(n, base, line, target, rays, index):
+    """A slice's samples beside the located rays, interpolated, into row `target`."""
+    for i in range(n):
+        k = np.uint64(index[i])
+        rays[base + LEFT + i] = line[k]
+        rays[base + RIGHT + i] = line[k + np.uint64(1)]
+    for i in range(n):
+        a = rays[base + LEFT + i]
+        rays[base + target + i] = a + rays[base + PART + i] * (rays[base + RIGHT + i] - a)
+
+
+@inlined
+def sample_fields(n, base, depth, cut, values, scalar, light, rays, index):
+    """Scalars and light at a slice's depth into rows `scalar` and, by channel, `light` and on."""
+    locate_rays(n, base, depth, cut, values.shape[1], rays, index)
+    sample_rays(n, base, values[0], scalar, rays, index)
+    for f in range(cut.channels):
+        sample_rays(n, base, values[1 + f], light + np.uint64(f * ROW), rays, index)
+
+
+@inlined
+def share_of_slab(n, base, depth, distance, rays):
+    """How much of the slab from `depth` on lies on each ray between ENTER and LEAVE, in lengths of a slab."""
+    near, far, inverse = np.float32(depth), np.float32(depth + distance), np.float32(1.0 / distance)
+    for i in range(n):
+        part = min(far, rays[base + LEAVE + i]) - max(near, rays[base + ENTER + i])
+        rays[base + SHARE + i] = max(part, ZERO) * inverse
+
+
+@inlined
+def classify(n, base, extinction, color, rays, packed):
+    """Optical depth of a slab of nominal length, and its packed colour, from the scalars at its two ends."""
+    for i in range(n):
+        front, back = np.int32(rays[base + FRONT + i] + HALF_WAY), np.int32(rays[base + BACK + i] + HALF_WAY)
+        packed[i] = np.int32(np.int32(front << np.int32(8)) + back)
+    for i in range(n):
+        k = np.uint64(packed[i])
+        rays[base + OPTICAL + i] = extinction[k]
+        packed[i] = color[k]
+
+
+@inlined
+def reflect(light, material, colors, specular, base, i, c, rays):
+    """What light makes of colour channel c: (factor, added highlight)."""
+    ambient, diffuse, shine = material
+    row = np.uint64(ROW)
+    d = np.uint64(c if colors == 3 else 0) * row
+    s = np.uint64(colors + (c if colors == 3 else 0)) * row
+    factor = ambient + diffuse * HALF_WAY * (rays[base + FRONT_LIGHT + d + i] + rays[base + BACK_LIGHT + d + i])
+    added = ZERO
+    if specular:
+        added = shine * HALF_WAY * (rays[base + FRONT_LIGHT + s + i] + rays[base + BACK_LIGHT + s + i])
+    return factor, added
+
+
+@inlined
+def blend(n, base, material, light, rays, packed):
+    """Add a slab to the rays: SHARE is its opacity; light = (channels, colours)."""
+    ambient, diffuse, _ = material
+    channels, colors = light
+    if channels <= 1:
+        a, d = (ambient, diffuse * HALF_WAY) if channels == 1 else (ONE, ZERO)
+        for i in range(n):
+            w = rays[base + T + i] * rays[base + SHARE + i]
+            factor = w * COLOR_STEP * (a + d * (rays[base + FRONT_LIGHT + i] + rays[base + BACK_LIGHT + i]))
+            c = packed[i]
+            rays[base + R + i] += factor * np.float32(c & TEN_BITS)
+            rays[base + G + i] += factor * np.float32((c >> np.int32(10)) & TEN_BITS)
+            rays[base + B + i] += factor * np.float32((c >> np.int32(20)) & TEN_BITS)
+            rays[base + T + i] -= w
+        return
+    specular = channels > colors
+    for i in range(n):
+        w = rays[base + T + i] * rays[base + SHARE + i]
+        c = packed[i]
+        factor, added = reflect(light, material, colors, specular, base, i, 0, rays)
+        rays[base + R + i] += w * (factor * np.float32(c & TEN_BITS) * COLOR_STEP + added)
+        factor, added = reflect(light, material, colors, specular, base, i, 1, rays)
+        rays[base + G + i] += w * (factor * np.float32((c >> np.int32(10)) & TEN_BITS) * COLOR_STEP + added)
+        factor, added = reflect(light, material, colors, specular, base, i, 2, rays)
+        rays[base + B + i] += w * (factor * np.float32((c >> np.int32(20)) & TEN_BITS) * COLOR_STEP + added)
+        rays[base + T + i] -= w
+
+
+@inlined
+def find_half(n, base, depth, distance, rays):
+    """Note where opacity reaches ½ within a slab: T before the slab is in OPTICAL."""
+    near, far = np.float32(depth), np.float32(depth + distance)
+    for i in range(n):
+        before, after = rays[base + OPTICAL + i], rays[base + T + i]
+        enter, leave = max(near, rays[base + ENTER + i]), min(far, rays[base + LEAVE + i])
+        part = (before - HALF_WAY) / max(before - after, np.float32(1e-9))
+        if (before > HALF_WAY) & (after <= HALF_WAY):
+            rays[base + HALF + i] = enter + part * (leave - enter)
+
+
+@inlined
+def block_span(n, base, depth, cut, rays):
+    """Least and greatest sample of a slice near which a block's rays pass."""
+    least, most = np.float32(1e30), np.float32(-1e30)
+    d = np.float32(depth)
+    for i in range(n):
+        x = rays[base + ORIGIN + i] + d * rays[base + TURN + i]
+        least, most = min(least, x), max(most, x)
+    count = np.float64(1 << 24)
+    first = min(max((least - cut.first) / cut.step, -1.0), count)
+    last = min(max((most - cut.first) / cut.step, -1.0), count)
+    return np.int64(first), np.int64(last) + 1
+
+
+@kernel
+def march(n, base, cut, slices, first, last, table, material, light, wants_half, planes, rays, packed):
+    """Take a block of rays through slabs first … last, whose slices are in planes.values from 0 on."""
+    fresh = False
+    material = (np.float32(material[0]), np.float32(material[1]), np.float32(material[2]))
+    deepest = ZERO
+    for i in range(n):
+        deepest = max(deepest, rays[base + T + i])
+    if deepest < OPAQUE:
+        return
+    for k in range(first, last):
+        depth = slices.first + k * slices.distance
+        a0, a1 = block_span(n, base, depth, cut, rays)
+        b0, b1 = block_span(n, base, depth + slices.distance, cut, rays)
+        if not (any_marked(planes.marks, k, a0, a1) or any_marked(planes.marks, k + 1, b0, b1)):
+            fresh = False
+            continue
+        if not fresh:
+            sample_fields(n, base, depth, cut, planes.values[k - first], FRONT, FRONT_LIGHT, rays, packed)
+        values = planes.values[k - first + 1]
+        sample_fields(n, base, depth + slices.distance, cut, values, BACK, BACK_LIGHT, rays, packed)
+        share_of_slab(n, base, depth, slices.distance, rays)
+        classify(n, base, table.extinction, table.color, rays, packed)
+        for i in range(n):
+            optical = rays[base + OPTICAL + i] * rays[base + SHARE + i] * rays[base + LENGTH + i]
+            rays[base + SHARE + i] = ONE - exp2_fast(-optical)
+        if wants_half:
+            for i in range(n):
+                rays[base + OPTICAL + i] = rays[base + T + i]
+        blend(n, base, material, light, rays, packed)
+        if wants_half:
+            find_half(n, base, depth, slices.distance, rays)
+        for i in range(n):
+            rays[base + FRONT + i] = rays[base + BACK + i]
+        for f in range(light[0]):
+            row = np.uint64(f * ROW)
+            for i in range(n):
+                rays[base + FRONT_LIGHT + row + i] = rays[base + BACK_LIGHT + row + i]
+        fresh = True

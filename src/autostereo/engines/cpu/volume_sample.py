@@ -1,0 +1,300 @@
+"""One image row of a volume: all rays of all views lie in one plane, on which the volume is sampled once.
+
+The plane is cut by slices of constant eye depth d_k, the same for all views (Hübner 2007a, section 3.2). On each
+slice scalars and gradients are interpolated trilinearly at evenly spaced X, a quarter to half of a voxel apart, and
+lit; whatever a ray of any view needs is then an interpolation between two neighbours. Runs of 16 samples in which no
+block of voxels shows anything get one scalar each.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .jit import inlined, kernel
+from .mesh_shade import exp2_fast, log2_fast
+from .volume_setup import BLOCK
+
+CHUNK = 4  # log2 of samples in a run
+SLABS = 16  # slabs between slices that are handled together
+LIST = 272  # room for the samples that are handled at once
+AT_ONCE = 256
+PX, PY, PZ, VALUE, NX, NY, NZ, DIFFUSE, SHINE, LIGHT = (np.uint64(k * LIST) for k in range(10))
+LIST_ROWS = 16
+W0, W1, W2, W3, W4, W5, W6, W7 = (np.uint64(k * LIST) for k in range(8))
+ZERO, ONE, TINY = np.float32(0.0), np.float32(1.0), np.float32(1e-20)
+
+
+class Cut(NamedTuple):
+    """How a volume is cut by the slices.
+
+    scalars, words, shape: see volume_setup; index (3, 4) float64: index_from_eye, of (X, Y, depth, 1); halves
+    (K, 4): half-spaces in index space; shown: blocks; first, step: X of the first sample and from sample to sample;
+    low, scale: what makes a scalar a row of the table; rotation (3, 3) float32: eye_from_world; lights: see
+    scene_arrays.light_array; channels of light that samples get, and colours among them: diffuse, one or for each
+    colour one, then as many for the highlight if there is one; neutral: diffuse light that leaves a colour as it is;
+    shininess; lens: Y of the eyes.
+    """
+
+    scalars: np.ndarray
+    words: np.ndarray
+    shape: np.ndarray
+    index: np.ndarray
+    halves: np.ndarray
+    shown: np.ndarray
+    first: float
+    step: float
+    low: float
+    scale: float
+    rotation: np.ndarray
+    lights: np.ndarray
+    channels: int
+    colors: int
+    neutral: float
+    shininess: float
+    lens: float
+
+
+class Slices(NamedTuple):
+    """All slices: depth of the first, distance, number of slabs between them."""
+
+    first: float
+    distance: float
+    slabs: int
+
+
+class Planes(NamedTuple):
+    """One thread's memory for the slices at hand.
+
+    values (SLABS + 1, fields, J) float32: table rows, then channels of light; marks, wanted (all slices, J / 16)
+    uint8: runs in which something shows, and runs that are to be sampled; place (J,) int64, part, normal (3, J) float32.
+    """
+
+    values: np.ndarray
+    marks: np.ndarray
+    wanted: np.ndarray
+    place: np.ndarray
+    words: np.ndarray
+    lists: np.ndarray
+
+
+@inlined
+def on_slice(cut, row, depth):
+    """Index coordinates of X = 0 on a slice; row = (slope of Y over depth, Y at the eyes)."""
+    y = row[1] + depth * row[0]
+    m = cut.index
+    return (
+        m[0, 1] * y + m[0, 2] * depth + m[0, 3],
+        m[1, 1] * y + m[1, 2] * depth + m[1, 3],
+        m[2, 1] * y + m[2, 2] * depth + m[2, 3],
+    )
+
+
+@kernel
+def mark_runs(cut, row, slices, marks, wanted):
+    """Mark the runs of every slice in which a block shows something, and those and their neighbours as wanted.
+
+    Returns how many are marked.
+    """
+    marked = 0
+    runs = marks.shape[1]
+    half = 0.5 * (1 << CHUNK) * cut.step
+    margin = np.empty(3)
+    for a in range(3):
+        margin[a] = abs(cut.index[a, 0]) * half + 1.0
+    nx, ny, nz = cut.shape[0], cut.shape[1], cut.shape[2]
+    wanted[: slices.slabs + 1] = 0
+    for k in range(slices.slabs + 1):
+        x0, y0, z0 = on_slice(cut, row, slices.first + k * slices.distance)
+        for c in range(runs):
+            x = cut.first + (2 * c + 1) * half
+            i, j, l = x0 + x * cut.index[0, 0], y0 + x * cut.index[1, 0], z0 + x * cut.index[2, 0]
+            inside = (
+                (i > -margin[0]) & (i < nx - 1 + margin[0])
+                & (j > -margin[1]) & (j < ny - 1 + margin[1])
+                & (l > -margin[2]) & (l < nz - 1 + margin[2])
+            )
+            shows = False
+            if inside:
+                i = min(max(i, 0.0), nx - 1.0001)
+                j = min(max(j, 0.0), ny - 1.0001)
+                l = min(max(l, 0.0), nz - 1.0001)
+                shows = cut.shown[int(l) >> BLOCK, int(j) >> BLOCK, int(i) >> BLOCK] != 0
+            marks[k, c] = np.uint8(shows)
+            if shows:
+                marked += 1
+                for b in range(max(k - 1, 0), min(k + 2, slices.slabs + 1)):
+                    for a in range(max(c - 1, 0), min(c + 2, runs)):
+                        wanted[b, a] = np.uint8(1)
+    return marked
+
+
+@inlined
+def locate(n, start, direction, shape, place, lists):
+    """First of the eight voxels around n samples at start + i·direction, clamped to the grid, and the parts beyond."""
+    x, y, z = np.float32(start[0]), np.float32(start[1]), np.float32(start[2])
+    dx, dy, dz = np.float32(direction[0]), np.float32(direction[1]), np.float32(direction[2])
+    ex, ey, ez = np.float32(shape[0] - 1), np.float32(shape[1] - 1), np.float32(shape[2] - 1)
+    for i in range(n):
+        t = np.float32(i)
+        u, v, w = min(max(x + t * dx, ZERO), ex), min(max(y + t * dy, ZERO), ey), min(max(z + t * dz, ZERO), ez)
+        a, b, c = min(np.floor(u), ex - ONE), min(np.floor(v), ey - ONE), min(np.floor(w), ez - ONE)
+        lists[PX + i], lists[PY + i], lists[PZ + i] = u - a, v - b, w - c
+        place[i] = (np.int64(c) * shape[1] + np.int64(b)) * shape[0] + np.int64(a)
+
+
+@inlined
+def bring(n, source, shape, place, words):
+    """The eight voxels around n located samples, into rows of words: so that what follows is SIMD."""
+    down, deep = np.uint64(shape[0]), np.uint64(shape[0] * shape[1])
+    for i in range(n):
+        k = np.uint64(place[i])
+        words[W0 + i], words[W1 + i] = source[k], source[k + np.uint64(1)]
+        words[W2 + i], words[W3 + i] = source[k + down], source[k + down + np.uint64(1)]
+        k += deep
+        words[W4 + i], words[W5 + i] = source[k], source[k + np.uint64(1)]
+        words[W6 + i], words[W7 + i] = source[k + down], source[k + down + np.uint64(1)]
+
+
+@inlined
+def field(word, up, down):
+    """Some bits of a word, as a number with sign."""
+    return np.float32(np.int32(np.int32(word << up) >> down))
+
+
+@inlined
+def interpolate(n, up, down, row, words, lists):
+    """Trilinear interpolation of a field of the words that were brought, into a row of lists."""
+    for i in range(n):
+        a, b = field(words[W0 + i], up, down), field(words[W1 + i], up, down)
+        c, d = field(words[W2 + i], up, down), field(words[W3 + i], up, down)
+        e, f = field(words[W4 + i], up, down), field(words[W5 + i], up, down)
+        g, h = field(words[W6 + i], up, down), field(words[W7 + i], up, down)
+        u, v, w = lists[PX + i], lists[PY + i], lists[PZ + i]
+        a, c, e, g = a + u * (b - a), c + u * (d - c), e + u * (f - e), g + u * (h - g)
+        a, e = a + v * (c - a), e + v * (g - e)
+        lists[row + i] = a + w * (e - a)
+
+
+@inlined
+def light_samples(n, cut, eye, x, y, depth, lists):
+    """Light on n samples from X = x on, of which lists hold the gradients in world space, into LIGHT and on.
+
+    Both sides of a normal are lit alike: |N·L|, |N·H|; eye: X of the eye that highlights are for.
+    """
+    m, row = cut.rotation, np.uint64(LIST)
+    step, px, py, pz = np.float32(cut.step), np.float32(x), np.float32(y), np.float32(depth)
+    for i in range(n):
+        a, b, c = lists[NX + i], lists[NY + i], lists[NZ + i]
+        u = m[0, 0] * a + m[0, 1] * b + m[0, 2] * c
+        v = m[1, 0] * a + m[1, 1] * b + m[1, 2] * c
+        w = m[2, 0] * a + m[2, 1] * b + m[2, 2] * c
+        scale = ONE / np.sqrt(max(u * u + v * v + w * w, TINY))
+        lists[NX + i], lists[NY + i], lists[NZ + i] = u * scale, v * scale, w * scale
+    for f in range(cut.channels):
+        first = LIGHT + np.uint64(f) * row
+        for i in range(n):
+            lists[first + i] = ZERO
+    specular = cut.channels > cut.colors
+    vy, vz, shininess, eye = np.float32(cut.lens) - py, -pz, np.float32(cut.shininess), np.float32(eye)
+    for k in range(cut.lights.shape[0]):
+        lx, ly, lz = cut.lights[k, 1], cut.lights[k, 2], cut.lights[k, 3]
+        p = cut.lights[k, 0]
+        for i in range(n):
+            at = px + np.float32(i) * step
+            tx, ty, tz = lx - p * at, ly - p * py, lz - p * pz
+            scale = ONE / np.sqrt(max(tx * tx + ty * ty + tz * tz, TINY))
+            lists[PX + i], lists[PY + i], lists[PZ + i] = tx * scale, ty * scale, tz * scale
+        for i in range(n):
+            lists[DIFFUSE + i] = abs(
+                lists[NX + i] * lists[PX + i] + lists[NY + i] * lists[PY + i] + lists[NZ + i] * lists[PZ + i]
+            )
+        if specular:
+            for i in range(n):
+                vx = eye - (px + np.float32(i) * step)
+                scale = ONE / np.sqrt(max(vx * vx + vy * vy + vz * vz, TINY))
+                hx, hy, hz = lists[PX + i] + vx * scale, lists[PY + i] + vy * scale, lists[PZ + i] + vz * scale
+                scale = ONE / np.sqrt(max(hx * hx + hy * hy + hz * hz, TINY))
+                shine = abs(lists[NX + i] * hx + lists[NY + i] * hy + lists[NZ + i] * hz) * scale
+                shine = exp2_fast(shininess * log2_fast(min(max(shine, TINY), ONE)))
+                lists[SHINE + i] = shine if lists[DIFFUSE + i] > ZERO else ZERO
+        for f in range(cut.colors):
+            color, first = cut.lights[k, 4 + f], LIGHT + np.uint64(f) * row
+            for i in range(n):
+                lists[first + i] += color * lists[DIFFUSE + i]
+            if specular:
+                first += np.uint64(cut.colors) * row
+                for i in range(n):
+                    lists[first + i] += color * lists[SHINE + i]
+    neutral = np.float32(cut.neutral)
+    for f in range(cut.colors):
+        first = LIGHT + np.uint64(f) * row
+        for i in range(n):
+            a, b, c = lists[NX + i], lists[NY + i], lists[NZ + i]
+            lists[first + i] = lists[first + i] if a * a + b * b + c * c > np.float32(0.5) else neutral
+
+
+@kernel
+def sample_run(n, cut, eye, x, y, depth, start, place, words, lists):
+    """Scalars, as rows of the table, and light of n ≤ 256 samples from X = x on, into lists."""
+    m = cut.index
+    begin = (start[0] + x * m[0, 0], start[1] + x * m[1, 0], start[2] + x * m[2, 0])
+    locate(n, begin, (m[0, 0] * cut.step, m[1, 0] * cut.step, m[2, 0] * cut.step), cut.shape, place, lists)
+    low, scale = np.float32(cut.low), np.float32(cut.scale)
+    together = cut.channels > 0 and cut.scalars.itemsize == 1
+    if not together:
+        bring(n, cut.scalars, cut.shape, place, words)
+        interpolate(n, np.int32(0), np.int32(0), VALUE, words, lists)
+    if cut.channels > 0:
+        bring(n, cut.words, cut.shape, place, words)
+        interpolate(n, np.int32(24), np.int32(24), NX, words, lists)
+        interpolate(n, np.int32(16), np.int32(24), NY, words, lists)
+        interpolate(n, np.int32(8), np.int32(24), NZ, words, lists)
+    if together:
+        interpolate(n, np.int32(0), np.int32(24), VALUE, words, lists)
+        low -= np.float32(128.0)  # bytes are stored with their sign turned
+    for i in range(n):
+        lists[VALUE + i] = (lists[VALUE + i] - low) * scale
+    if cut.channels > 0:
+        light_samples(n, cut, eye, x, y, depth, lists)
+
+
+@kernel
+def sample_slice(cut, eye, row, slices, k, planes, into):
+    """Sample slice k into planes.values[into]; runs that are not wanted get the scalar of their middle."""
+    runs = planes.wanted.shape[1]
+    depth = slices.first + k * slices.distance
+    start, y = on_slice(cut, row, depth), row[1] + depth * row[0]
+    values, place, lists = planes.values, planes.place, planes.lists
+    m = cut.index
+    c = 0
+    while c < runs:
+        end, wanted = c + 1, planes.wanted[k, c]
+        while wanted != 0 and end < min(runs, c + (AT_ONCE >> CHUNK)) and planes.wanted[k, end] != 0:
+            end += 1
+        j = c << CHUNK
+        n = np.uint64((end - c) << CHUNK)
+        if wanted == 0:
+            x = cut.first + (j + (1 << (CHUNK - 1))) * cut.step
+            begin = (start[0] + x * m[0, 0], start[1] + x * m[1, 0], start[2] + x * m[2, 0])
+            locate(np.uint64(1), begin, begin, cut.shape, place, lists)
+            value = np.float32((np.float64(cut.scalars[np.uint64(place[0])]) - cut.low) * cut.scale)
+            values[into, 0, j : j + (1 << CHUNK)] = value
+        else:
+            sample_run(n, cut, eye, cut.first + j * cut.step, y, depth, start, place, planes.words, lists)
+            for f in range(1 + cut.channels):
+                first = VALUE if f == 0 else LIGHT + np.uint64((f - 1) * LIST)
+                line = values[into, f, j:]
+                for i in range(n):
+                    line[i] = lists[first + i]
+        c = end
+
+
+@inlined
+def any_marked(marks, k, first, last):
+    """Whether a run of slice k between samples first … last is marked."""
+    found = np.uint8(0)
+    for c in range(max(first, 0) >> CHUNK, min(last >> CHUNK, marks.shape[1] - 1) + 1):
+        found |= marks[k, c]
+    return found != 0

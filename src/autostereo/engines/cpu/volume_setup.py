@@ -1,0 +1,217 @@
+"""Volumes before they are drawn: scalars, quantised gradients, blocks that show something, classification.
+
+Once per scene: scalars of 8 or 16 bits (others are scaled to 16), gradients of three bytes, the range of scalars in
+every block of 4³ voxels. Once per transfer function: which blocks show anything, and the table of pre-integrated slabs.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...scene.transfer import TransferFunction
+from ...scene.volume import Volume
+from ...transforms import apply
+from ..engine import Camera
+from .jit import kernel
+from .threads import run_rows
+
+BLOCK = 2  # log2 of the edge of a block, in voxels
+TABLE = 256  # scalars of the pre-integration table
+
+
+class Grid(NamedTuple):
+    """One volume as the kernels read it.
+
+    scalars (nz·ny·nx,) uint8 or uint16; words (nz·ny·nx,) int32: three bytes of gradient, see store_gradients, and
+    above them the scalar if it is one byte, or (0,) without shading; shape (3,) int64: nx, ny, nz; low, high: stored
+    scalars of the first and the last row of the table.
+    """
+
+    scalars: NDArray[Any]
+    words: NDArray[np.int32]
+    shape: NDArray[np.int64]
+    low: float
+    high: float
+
+
+class Field(NamedTuple):
+    """A prepared volume: what it is, its grid, (2, …) block ranges, the value of stored scalar 0 and of one step."""
+
+    volume: Volume
+    grid: Grid
+    blocks: NDArray[np.float32]
+    first_value: float
+    value_step: float
+
+
+@kernel
+def block_ranges(scalars, shape, first, last, ranges):
+    """Fill ranges (2, nbz, nby, nbx) with least and greatest scalar of block layers first … last and their border."""
+    nx, ny, nz = shape[0], shape[1], shape[2]
+    for bz in range(first, last):
+        for by in range(ranges.shape[2]):
+            for bx in range(ranges.shape[3]):
+                least, most = scalars[0], scalars[0]
+                begin = True
+                for z in range(bz << BLOCK, min(((bz + 1) << BLOCK) + 1, nz)):
+                    for y in range(by << BLOCK, min(((by + 1) << BLOCK) + 1, ny)):
+                        row = (z * ny + y) * nx
+                        for x in range(bx << BLOCK, min(((bx + 1) << BLOCK) + 1, nx)):
+                            value = scalars[np.uint64(row + x)]
+                            if begin:
+                                least, most, begin = value, value, False
+                            least, most = min(least, value), max(most, value)
+                ranges[0, bz, by, bx] = least
+                ranges[1, bz, by, bx] = most
+
+
+@kernel
+def store_gradients(scalars, shape, sobel, matrix, steepest, first, last, words):
+    """Quantise the gradients (world space) of voxel layers first … last: 127 is `steepest`.
+
+    Slight gradients keep a direction, with at least one step. They are central differences, one-sided at the borders,
+    for `sobel` smoothed by (¼, ½, ¼) along both other axes; matrix (3, 3): ∂(i, j, k)/∂world.
+    """
+    nx, ny, nz = shape[0], shape[1], shape[2]
+    reach = 1 if sobel else 0
+    for z in range(first, last):
+        for y in range(ny):
+            for x in range(nx):
+                g0, g1, g2 = 0.0, 0.0, 0.0
+                for c in range(-reach, reach + 1):
+                    for b in range(-reach, reach + 1):
+                        weight = (2 - abs(b)) * (2 - abs(c)) / 16.0 if sobel else 1.0
+                        xb, yb = min(max(x + b, 0), nx - 1), min(max(y + b, 0), ny - 1)
+                        yc, zc = min(max(y + c, 0), ny - 1), min(max(z + c, 0), nz - 1)
+                        a, e = max(x - 1, 0), min(x + 1, nx - 1)
+                        k = (zc * ny + yb) * nx
+                        g0 += weight * (np.float64(scalars[k + e]) - np.float64(scalars[k + a])) / (e - a)
+                        a, e = max(y - 1, 0), min(y + 1, ny - 1)
+                        k = zc * ny * nx + xb
+                        g1 += weight * (np.float64(scalars[k + e * nx]) - np.float64(scalars[k + a * nx])) / (e - a)
+                        a, e = max(z - 1, 0), min(z + 1, nz - 1)
+                        k = yc * nx + xb
+                        below, above = np.float64(scalars[k + a * ny * nx]), np.float64(scalars[k + e * ny * nx])
+                        g2 += weight * (above - below) / (e - a)
+                a = matrix[0, 0] * g0 + matrix[1, 0] * g1 + matrix[2, 0] * g2
+                b = matrix[0, 1] * g0 + matrix[1, 1] * g1 + matrix[2, 1] * g2
+                c = matrix[0, 2] * g0 + matrix[1, 2] * g1 + matrix[2, 2] * g2
+                length = np.sqrt(a * a + b * b + c * c)
+                scale = 0.0
+                if length > 0.0:
+                    most = max(abs(a), abs(b), abs(c))
+                    scale = max(127.0 * min(length / steepest, 1.0) / length, 1.0 / most)
+                k = (z * ny + y) * nx + x
+                p = np.int64(np.floor(a * scale + 0.5)) & 255
+                q = np.int64(np.floor(b * scale + 0.5)) & 255
+                r = np.int64(np.floor(c * scale + 0.5)) & 255
+                words[k] = np.int32((((np.int64(scalars[k]) & 255) ^ 128) << 24) | (r << 16) | (q << 8) | p)
+
+
+def prepare_field(volume: Volume, wide: bool) -> Field:
+    """Prepare a volume; `wide` asks for 16 bits, so that several volumes are of one type.
+
+    Scalars that are 8 or 16 bits without sign already are not copied.
+    """
+    values, (low, high) = volume.values, volume.value_range
+    first_value, value_step = 0.0, 1.0
+    if values.dtype == np.uint16 or (values.dtype == np.uint8 and not wide):
+        scalars = values.reshape(-1)
+    elif values.dtype.kind in "iu":
+        first_value = low if values.dtype.kind == "i" else 0.0
+        target = np.uint8 if values.dtype.itemsize == 1 and not wide else np.uint16
+        scalars = np.empty(values.size, target)
+        np.subtract(values.reshape(-1), int(first_value), out=scalars, casting="unsafe")
+    else:
+        first_value, value_step = low, max(high - low, 1e-300) / 65535.0
+        scalars = np.empty(values.size, np.uint16)
+        flat = values.reshape(-1)
+        for k in range(0, len(flat), 1 << 22):
+            part = flat[k : k + (1 << 22)].astype(np.float64)
+            scalars[k : k + (1 << 22)] = np.floor((part - low) / value_step + 0.5)
+    shape = np.array(volume.shape, np.int64)
+    blocks = np.empty((2, *(-(-(n - 1) // (1 << BLOCK)) for n in volume.values.shape)), np.float32)
+    run_rows(blocks.shape[1], lambda first, last: block_ranges(scalars, shape, first, last, blocks), 2)
+    words = np.zeros(0, np.int32)
+    if volume.shade and volume.mode == "composite":
+        words = np.empty(values.size, np.int32)
+        matrix = np.linalg.inv(volume.world_from_index)[:3, :3].astype(np.float64)
+        steepest = max(high - low, 1e-300) / value_step / 2 / float(volume.voxel_size.min())
+        args = (scalars, shape, volume.gradient == "sobel", matrix, steepest)
+        run_rows(volume.values.shape[0], lambda first, last: store_gradients(*args, first, last, words), 2)
+    grid = Grid(scalars, words, shape, (low - first_value) / value_step, (high - first_value) / value_step)
+    return Field(volume, grid, blocks, first_value, value_step)
+
+
+# --- classification ------------------------------------------------------------------------------------------------
+
+
+class Table(NamedTuple):
+    """Pre-integrated slabs: [front, back] over 256 scalars from low to high.
+
+    opacity (65536,) float32: of a slab of the nominal length; extinction (65536,) float32: optical depth of such a
+    slab, in powers of ½; color (65536,) int32: 10 bits a channel.
+    """
+
+    opacity: NDArray[np.float32]
+    extinction: NDArray[np.float32]
+    color: NDArray[np.int32]
+
+
+def make_table(transfer: TransferFunction, low: float, high: float, length: float) -> Table:
+    """Return the table of slabs of a length in scene units for scalar values low … high."""
+    rgba = transfer.table(low, max(high, np.nextafter(low, np.inf)), TABLE, length).reshape(-1, 4)
+    optical = rgba[:, 3].astype(np.float64) * length
+    c = np.floor(np.clip(rgba[:, :3], 0, 1) * 1023.0 + 0.5).astype(np.int32)
+    return Table(
+        -np.expm1(-optical).astype(np.float32),
+        (optical / np.log(2.0)).astype(np.float32),
+        c[:, 0] | (c[:, 1] << 10) | (c[:, 2] << 20),
+    )
+
+
+def shown_blocks(field: Field, reach: int) -> NDArray[np.uint8]:
+    """Blocks (nbz, nby, nbx) within `reach` blocks of which the volume shows anything."""
+    volume, count = field.volume, 4096
+    low, high = volume.value_range
+    ranges = field.blocks.astype(np.float64) * field.value_step + field.first_value
+    if volume.mode == "iso":
+        assert volume.iso is not None
+        shown = (ranges[0] <= volume.iso) & (ranges[1] >= volume.iso)
+    else:
+        values = np.union1d(np.linspace(low, high, count), np.clip(volume.transfer.points[:, 0], low, high))
+        sides = [volume.transfer.limit(values, side)[..., 3] > 0 for side in ("left", "right")]
+        total = np.concatenate([[0], np.cumsum(sides[0] | sides[1])])
+        first = np.maximum(np.searchsorted(values, ranges[0], "right") - 1, 0)
+        last = np.minimum(np.searchsorted(values, ranges[1], "left") + 1, len(values))
+        shown = total[last] > total[first]
+    for axis in range(3):
+        padded = np.pad(shown, [(reach, reach) if a == axis else (0, 0) for a in range(3)])
+        parts = [np.take(padded, range(k, k + shown.shape[axis]), axis) for k in range(2 * reach + 1)]
+        shown = np.logical_or.reduce(parts)
+    return np.ascontiguousarray(shown, dtype=np.uint8)
+
+
+# --- space ---------------------------------------------------------------------------------------------------------
+
+
+def half_spaces(volume: Volume) -> NDArray[np.float64]:
+    """Rows h (K, 4) such that h·(i, j, k, 1) ≥ 0 for all of them where something is seen: box, clipping box, plane."""
+    last = np.asarray(volume.shape) - 1.0
+    rows = [np.eye(4)[:3], np.column_stack([-np.eye(3), last])]
+    if volume.clip_box is not None:
+        low, high = volume.clip_box
+        box = np.vstack([np.column_stack([np.eye(3), -low]), np.column_stack([-np.eye(3), high])])
+        rows.append(box[np.isfinite(box).all(axis=1)] @ volume.object_from_index)
+    if volume.clip_plane is not None:
+        rows.append(np.asarray(volume.clip_plane)[None] @ volume.object_from_index)
+    return np.vstack(rows)
+
+
+def depth_range(volumes: list[Volume], camera: Camera) -> tuple[float, float]:
+    """Least and greatest eye depth of the boxes, from the near plane on."""
+    depth = np.concatenate([apply(camera.eye_from_world, v.corners)[:, 2] for v in volumes])
+    return max(float(depth.min()), camera.near), float(depth.max())

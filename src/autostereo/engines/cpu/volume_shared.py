@@ -1,0 +1,213 @@
+"""Volumes for all views at once: every slab is classified and lit once, for the centre camera, then only slides.
+
+Between views a slab moves by `offset · parallax` pixels (DESIGN section 1), so a view's slab is that of the centre
+camera, shifted and linearly interpolated: contiguous loads, no tables, no gathers. Against blur the centre camera's
+slabs are sampled `fine` times as densely as pixels. Position m of a slab lies at x = begin + m/fine; it is kept at
+[m mod phases][m div phases], so that what lies `phases` positions apart, such as a view's pixels, is contiguous.
+
+Slabs have their nominal length here. Seen obliquely they are longer by a factor that is constant along a ray: the
+transmittance of a ray is that power of the product, exactly; its colour is scaled alike (finish_rays).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .jit import inlined, kernel
+from .mesh_shade import whole_steps
+from .volume_rays import (
+    B,
+    G,
+    HALF_WAY,
+    LEAVE,
+    LENGTH,
+    ONE,
+    OPTICAL,
+    ORIGIN,
+    R,
+    RAYS,
+    SHARE,
+    T,
+    TURN,
+    ZERO,
+    BACK,
+    BACK_LIGHT,
+    BLOCK_ROWS,
+    FRONT,
+    FRONT_LIGHT,
+    ROW,
+    blend,
+    block_span,
+    classify,
+    ray_stretch,
+    sample_fields,
+    share_of_slab,
+)
+from .volume_sample import SLABS, any_marked
+
+LINE = 4096 + 80  # room for the positions of one phase, a constant so that rows are known not to overlap
+RED, GREEN, BLUE, ALPHA = (np.uint64(k * LINE) for k in range(4))
+SLAB_ROWS = 4
+
+
+class Shared(NamedTuple):
+    """Classified slabs of one chunk, one thread's memory.
+
+    begin: x of position 0; fine, phases: see above; count: positions of a phase, a multiple of 64; values
+    (SLABS · phases · 4 · LINE,) float32: colour times opacity, and opacity; shown (SLABS, count/64) uint8: groups of
+    64 positions in which something is seen, and 2 for those beside them, which are all zero.
+    """
+
+    begin: float
+    fine: int
+    phases: int
+    count: int
+    values: np.ndarray
+    shown: np.ndarray
+
+
+@inlined
+def shift_of(camera, slices, k):
+    """Pixels by which slab k moves per unit of camera offset, as seen in its middle."""
+    depth = slices.first + (k + 0.5) * slices.distance
+    return camera.fx / camera.focal - camera.fx / depth
+
+
+@inlined
+def start_positions(n, base, first, step, camera, row, far, rays):
+    """Rays of the centre camera through x = first + i·step."""
+    inverse, half = np.float32(1.0 / camera.fx), np.float32(camera.centre_x - 0.5 - first)
+    by = np.float32(step)
+    for i in range(n):
+        rays[base + ORIGIN + i] = ZERO
+        rays[base + TURN + i] = (np.float32(i) * by - half) * inverse
+        rays[base + LENGTH + i] = ONE
+        rays[base + LEAVE + i] = np.float32(far)
+
+
+@kernel
+def classify_slabs(cut, camera, row, slices, first, last, table, material, light, planes, shared, rays, packed):
+    """Fill shared.values with slabs first … last, whose slices are in planes.values from 0 on."""
+    far = slices.first + slices.slabs * slices.distance
+    n = np.uint64(RAYS)
+    groups = shared.count // RAYS
+    base = np.uint64(0)
+    material = (np.float32(material[0]), np.float32(material[1]), np.float32(material[2]))
+    for g in range(groups):
+        for k in range(last - first):
+            shared.shown[k, g] = np.uint8(0)
+        for phase in range(shared.phases):
+            x = shared.begin + (g * RAYS * shared.phases + phase) / shared.fine
+            start_positions(n, base, x, shared.phases / shared.fine, camera, row, far, rays)
+            ray_stretch(n, base, cut, row, slices.first, rays)
+            fresh = False
+            for k in range(first, last):
+                depth = slices.first + k * slices.distance
+                a0, a1 = block_span(n, base, depth, cut, rays)
+                b0, b1 = block_span(n, base, depth + slices.distance, cut, rays)
+                place = np.uint64(((k - first) * shared.phases + phase) * SLAB_ROWS * LINE + g * RAYS)
+                if not (any_marked(planes.marks, k, a0, a1) or any_marked(planes.marks, k + 1, b0, b1)):
+                    fresh = False
+                    for c in range(4):
+                        clear = place + np.uint64(c * LINE)
+                        for i in range(n):
+                            shared.values[clear + i] = ZERO
+                    continue
+                if not fresh:
+                    sample_fields(n, base, depth, cut, planes.values[k - first], FRONT, FRONT_LIGHT, rays, packed)
+                values = planes.values[k - first + 1]
+                sample_fields(n, base, depth + slices.distance, cut, values, BACK, BACK_LIGHT, rays, packed)
+                share_of_slab(n, base, depth, slices.distance, rays)
+                classify(n, base, table.opacity, table.color, rays, packed)
+                for i in range(n):
+                    rays[base + SHARE + i] *= rays[base + OPTICAL + i]
+                    rays[base + T + i] = ONE
+                    rays[base + R + i] = ZERO
+                    rays[base + G + i] = ZERO
+                    rays[base + B + i] = ZERO
+                blend(n, base, material, light, rays, packed)
+                for i in range(n):
+                    shared.values[place + RED + i] = rays[base + R + i]
+                    shared.values[place + GREEN + i] = rays[base + G + i]
+                    shared.values[place + BLUE + i] = rays[base + B + i]
+                    shared.values[place + ALPHA + i] = rays[base + SHARE + i]
+                    rays[base + FRONT + i] = rays[base + BACK + i]
+                for f in range(light[0]):
+                    lane = np.uint64(f * ROW)
+                    for i in range(n):
+                        rays[base + FRONT_LIGHT + lane + i] = rays[base + BACK_LIGHT + lane + i]
+                shared.shown[k - first, g] = np.uint8(1)
+                fresh = True
+
+
+@inlined
+def next_run(shared, k, j):
+    """The next stretch of shown positions of slab k from j on: (first, end); first = count when there is none."""
+    groups = shared.count // RAYS
+    g = j // RAYS
+    while g < groups and shared.shown[k, g] == 0:
+        g += 1
+    begin = g
+    while g < groups and shared.shown[k, g] != 0:
+        g += 1
+    return begin * RAYS, g * RAYS
+
+
+@inlined
+def blend_run(n, near, beside, part, t, values, line):
+    """Add n positions of a slab to a view's pixels; near, beside: places of the left and right neighbours."""
+    for i in range(n):
+        r, g, b, a = values[near + RED + i], values[near + GREEN + i], values[near + BLUE + i], values[near + ALPHA + i]
+        r += part * (values[beside + RED + i] - r)
+        g += part * (values[beside + GREEN + i] - g)
+        b += part * (values[beside + BLUE + i] - b)
+        a += part * (values[beside + ALPHA + i] - a)
+        through = line[t + ALPHA + i]
+        line[t + RED + i] += through * r
+        line[t + GREEN + i] += through * g
+        line[t + BLUE + i] += through * b
+        line[t + ALPHA + i] = through - through * a
+
+
+@kernel
+def blend_view(offset, width, camera, slices, first, last, shared, t, line):
+    """Add slabs first … last to the pixels of one view, whose sums are rows of `line` from place t on."""
+    phases = shared.phases
+    for k in range(first, last):
+        at = (-offset * shift_of(camera, slices, k) - shared.begin) * shared.fine
+        m = np.int64(np.floor(at))
+        part = np.float32(at - m)
+        q, phase = m // phases, m % phases  # pixel 0 is beside position q of this phase
+        slab = (k - first) * phases
+        near = (slab + phase) * SLAB_ROWS * LINE
+        beside = (slab + phase + 1) * SLAB_ROWS * LINE if phase + 1 < phases else slab * SLAB_ROWS * LINE + 1
+        j = max(q, 0)
+        while True:
+            begin, end = next_run(shared, k - first, j)
+            begin, end = max(begin - 1, j), min(end, shared.count - 1)
+            x0, x1 = begin - q, min(end - q, width)
+            if x0 >= width or begin >= end:
+                break
+            if x1 > x0:
+                blend_run(
+                    np.uint64(x1 - x0),
+                    np.uint64(near + begin),
+                    np.uint64(beside + begin),
+                    part,
+                    np.uint64(t + x0),
+                    shared.values,
+                    line,
+                )
+            j = end
+
+
+@inlined
+def clear_line(n, t, line):
+    """Sums of a view's pixels before anything is seen."""
+    for i in range(n):
+        line[t + RED + i] = ZERO
+        line[t + GREEN + i] = ZERO
+        line[t + BLUE + i] = ZERO
+        line[t + ALPHA + i] = ONE
