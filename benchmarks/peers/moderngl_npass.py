@@ -7,4 +7,8 @@ from loop import main
 from autostereo.cli.benchmarks.peers_moderngl import ModernGLLoop, shared_context
 
 if __name__ == "__main__":
-    main(lambda scene, rig, size, lighting: ModernGLLoop(shared_context(), scene, rig, size, lighting))
+    main(
+        lambda scene, rig, size, switches: ModernGLLoop(
+            shared_context(), scene, rig, size, switches.lighting, switches.plain
+        )
+    )

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
+
 from loop import main
 
 from autostereo.cli.benchmarks.peers_vtk import VTKLoop, shared_window
 
+
+def variant(switches: Namespace) -> str:
+    """Which of the variants of VTKLoop."""
+    if switches.plain:
+        return "plain"
+    return "prelit" if switches.lighting == "vertex" else "tuned"
+
+
 if __name__ == "__main__":
-    main(
-        lambda scene, rig, size, lighting: VTKLoop(
-            shared_window(), scene, rig, size, "prelit" if lighting == "vertex" else "tuned"
-        )
-    )
+    main(lambda scene, rig, size, switches: VTKLoop(shared_window(), scene, rig, size, variant(switches)))

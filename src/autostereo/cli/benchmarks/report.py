@@ -48,7 +48,8 @@ def show(results: Results, facts: dict[str, Any]) -> None:
     for line in describe(facts):
         console.print(line, highlight=False)
     console.print(_figures(results))
-    console.print(_times(results))
+    if any(figure["times"] for figure in results):
+        console.print(_times(results))
     asked = [figure for figure in results if figure["met"] is not None]
     console.print(f"{sum(figure['met'] for figure in asked)} of {len(asked)} bars met", highlight=False)
 

@@ -104,9 +104,9 @@ def facts(options: BenchOptions | None = None) -> dict[str, Any]:
 def _agreement(studio: VolumeStudio, name: str, lighting: str) -> list[Figure]:
     """The contenders draw the same picture, compared at the outermost of 8 views."""
     scene, size = studio.scene(name), studio.size(*PANEL_8)
-    rig = studio.rig(name, 8, size)
-    exact = studio.renderer(scene).render_views(rig, size, options=Options(volume="exact")).color.copy()
-    passes = studio.renderer(scene).render_views(rig, size, method="n-pass").color
+    rig, renderer, options = studio.rig(name, 8, size), studio.renderer(scene), Options(volume="exact")
+    exact = renderer.render_views(rig, size, options=options).color.copy()
+    passes = renderer.render_views(rig, size, method="n-pass", options=options).color
     figures = [unlike(f"pixels of {EXACT} unlike {NPASS}", exact, passes, name)]
     loop = studio.vtk_loop(name, rig, size)
     if loop is not None:
