@@ -1,4 +1,4 @@
-"""autostereo's volumes against V passes and VTK's ray caster; the same as ``autostereo bench volume``, with every switch."""
+"""autostereo's volumes against V passes and VTK; the same as ``autostereo bench volume``, with every switch."""
 
 from __future__ import annotations
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from ...engines.options import Options
-from ...errors import DependencyError
+from ...errors import DependencyError, UnsupportedError
 from ...scene.scene import Scene
-from . import peers_vtk
+from . import peers_vtk, workloads
 from .harness import Contender
 from .suite import BenchOptions, Say
 from .workloads import Size
@@ -64,11 +64,21 @@ class Studio:
     # --- autostereo ------------------------------------------------------------------------------------------------
 
     def renderer(self, scene: Scene) -> Renderer:
-        """The kept renderer of a scene."""
+        """The kept renderer of a scene.
+
+        Raises
+        ------
+        AutostereoError
+            The engine does not draw such a scene; also if it says so by an empty picture, whose time would flatter it.
+        """
         from ...render import Renderer
 
         if scene not in self._renderers:
-            self._renderers[scene] = Renderer(scene, engine=self.options.engine)
+            renderer = Renderer(scene, engine=self.options.engine)
+            if coverage(renderer, (64, 64)) == 0:
+                kinds = ", ".join(sorted({type(item).__name__ for item in scene.objects}))
+                raise UnsupportedError(f"bench: engine {self.options.engine} draws nothing of this {kinds}")
+            self._renderers[scene] = renderer
         return self._renderers[scene]
 
     def forget(self, scene: Scene) -> None:
@@ -112,6 +122,12 @@ class Studio:
     def vtk_window(self) -> Any:
         """VTK's window, or None."""
         return self.handle(VTK, peers_vtk.shared_window)
+
+
+def coverage(renderer: Renderer, size: Size) -> float:
+    """Share of the centre view's pixels that show the scene."""
+    stack = renderer.render_views(workloads.rig_for(renderer.scene, 1, size), size)
+    return float(np.count_nonzero(stack.color[..., 3]) / stack.color[..., 3].size)
 
 
 def peer(name: str, loop: Loop, scale: float = 1.0) -> Contender:

@@ -12,7 +12,7 @@ import numpy as np
 from ...engines.options import Options
 from ...errors import InputError
 from . import jobs, workloads
-from .contenders import OURS, VTK
+from .contenders import OURS, VTK, coverage
 from .harness import Bar, Contender, Figure, Measured, Times, band, machine_facts, measure, ratio
 from .mesh_contenders import MODERNGL, MeshStudio
 from .suite import BenchOptions, Say, Work, check_works, run_works
@@ -109,18 +109,11 @@ def _views(name: str) -> Callable[[MeshStudio, str, str], list[Figure]]:
             contenders += studio.vtk(scene, rig, size, lighting)
         contenders.append(studio.write(views * size[0] * size[1] * 4))
         measured = Measured(name, measure(contenders, studio.options.rounds), scene_name, lighting)
-        note = f"{_coverage(studio, scene_name, lighting, size):.0%} of a view covered"
+        note = f"{coverage(studio.renderer(scene), size):.0%} of a view covered"
         asked = WRITE_BAR if name == "views-96" and lighting == "vertex" else None
         return [*_against_peers(measured, bars, note), measured.ratio(OURS, "write", asked)]
 
     return figures
-
-
-def _coverage(studio: MeshStudio, scene_name: str, lighting: str, size: Size) -> float:
-    """Share of the centre view's pixels that show the scene."""
-    scene = studio.scene(scene_name, lighting)
-    stack = studio.renderer(scene).render_views(workloads.rig_for(scene, 1, size), size=size)
-    return float(np.count_nonzero(stack.color[..., 3]) / stack.color[..., 3].size)
 
 
 def _panel(name: str) -> Callable[[MeshStudio, str, str], list[Figure]]:

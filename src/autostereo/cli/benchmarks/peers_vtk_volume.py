@@ -73,21 +73,23 @@ def _prop(volume: Volume, threads: int) -> Any:
     prop = vtkVolume()
     prop.SetMapper(mapper)
     prop.SetProperty(_property(volume, step))
-    place = vtkMatrix4x4()
-    place.DeepCopy(volume.transform.ravel().tolist())
-    prop.SetUserMatrix(place)
+    # all but the voxels' size: the mapper overlooks an image's orientation, and a prop's scale when it takes distances
+    place = volume.world_from_index.copy()
+    place[:3, :3] /= volume.voxel_size
+    matrix = vtkMatrix4x4()
+    matrix.DeepCopy(place.ravel().tolist())
+    prop.SetUserMatrix(matrix)
     return prop
 
 
 def _image(volume: Volume) -> Any:
+    """The values with their distances in the world, the first voxel at the origin."""
     from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkCommonDataModel import vtkImageData
 
     image = vtkImageData()
     image.SetDimensions(*volume.shape)
-    image.SetSpacing(*volume.spacing)
-    image.SetOrigin(*volume.origin)
-    image.SetDirectionMatrix(*volume.direction.ravel().tolist())
+    image.SetSpacing(*volume.voxel_size)
     image.GetPointData().SetScalars(numpy_to_vtk(volume.values.ravel(), deep=True))
     return image
 

@@ -7,7 +7,7 @@ from typing import Any
 from ...engines.options import Options
 from ...scene.scene import Scene
 from . import workloads
-from .contenders import NPASS, OURS, Studio
+from .contenders import NPASS, OURS, Studio, coverage
 from .harness import Bar, Figure, Measured, machine_facts, measure, unlike
 from .suite import BenchOptions, Say, Work, check_works, run_works
 from .workloads import Size
@@ -73,7 +73,8 @@ def _views_48(studio: PointStudio, name: str, lighting: str) -> list[Figure]:
         studio.views(scene, rig, size, Options(), NPASS, "n-pass"),
     ]
     measured = Measured("views-48", measure(contenders, studio.options.rounds), name)
-    return [measured.ratio(NPASS, OURS, Bar(8))]
+    note = f"{coverage(studio.renderer(scene), size):.0%} of a view covered"
+    return [measured.ratio(NPASS, OURS, Bar(8), note)]
 
 
 def _portrait(studio: PointStudio, name: str, lighting: str) -> list[Figure]:

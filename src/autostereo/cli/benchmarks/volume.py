@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...engines.options import Options
 from ...scene.scene import Scene
 from . import workloads
-from .contenders import NPASS, OURS, VTK, Studio, peer
+from .contenders import NPASS, OURS, VTK, Studio, coverage, peer
 from .harness import Bar, Contender, Figure, Measured, cores, machine_facts, measure, unlike
 from .suite import BenchOptions, Say, Work, check_works, run_works
 from .workloads import Size
@@ -128,15 +128,9 @@ def _views_48(studio: VolumeStudio, name: str, lighting: str) -> list[Figure]:
         *studio.vtk(name, rig, size),
     ]
     measured = Measured("views-48", measure(contenders, studio.options.rounds), name)
-    note = f"{_coverage(studio, name, rig, size):.0%} of a view covered"
+    note = f"{coverage(studio.renderer(scene), size):.0%} of a view covered"
     figures = [measured.ratio(VTK, OURS, VTK_BARS[name], note)] if VTK in measured.times else []
     return [*figures, measured.ratio(NPASS, OURS, note=note)]
-
-
-def _coverage(studio: VolumeStudio, name: str, rig: Rig, size: Size) -> float:
-    """Share of the centre view's pixels that show the volume."""
-    stack = studio.renderer(studio.scene(name)).render_views(rig.with_views(1), size)
-    return float(np.count_nonzero(stack.color[..., 3]) / stack.color[..., 3].size)
 
 
 def _views_96(studio: VolumeStudio, name: str, lighting: str) -> list[Figure]:
