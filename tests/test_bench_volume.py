@@ -296,7 +296,7 @@ def test_vtk_shows_a_bright_voxel_where_the_formula_says(index):
     values = np.zeros((13, 12, 16), np.uint8)
     i, j, k = index
     values[k, j, i] = 255
-    transfer = TransferFunction([(0, 1, 1, 1, 0), (128, 1, 1, 1, 0), (255, 1, 1, 1, 60)])
+    transfer = TransferFunction([(0, 1, 1, 1, 0), (255, 1, 1, 1, 60)])
     turned = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     marked = Volume(values, (0.1, 0.12, 0.08), (0.5, -0.7, -0.5), turned, transfer, shade=False)
     marked = replace(marked, transform=np.diag([1.2, 1.2, 1.2, 1.0]))
@@ -304,10 +304,10 @@ def test_vtk_shows_a_bright_voxel_where_the_formula_says(index):
     clip = workloads.clip_from_world(rig, (240, 160)) @ marked.world_from_index @ [i, j, k, 1.0]
     loop = vtk_loop(marked, rig, (240, 160))
     for view in range(3):
-        rows, columns = np.nonzero(loop.picture(view).max(axis=2) > 20)
+        rows, columns = np.nonzero(loop.picture(view).max(axis=2) > 60)
         assert len(rows)
         expected = 120 * (1 + clip[view, 0] / clip[view, 3]), 80 * (1 - clip[view, 1] / clip[view, 3])
-        np.testing.assert_allclose((columns.mean() + 0.5, rows.mean() + 0.5), expected, atol=1.0)
+        np.testing.assert_allclose((columns.mean() + 0.5, rows.mean() + 0.5), expected, atol=1.5)
     loop.release()
 
 
