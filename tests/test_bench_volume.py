@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from autostereo.cli import bench
 from autostereo.cli.benchmarks import (
     harness,
     jobs_volume,
@@ -23,6 +25,7 @@ from autostereo.cli.benchmarks import (
 from autostereo.cli.benchmarks.suite import BenchOptions
 from autostereo.display.rig import Rig
 from autostereo.engines import engine as engines
+from autostereo.engines.cpu import jit
 from autostereo.errors import AutostereoError, DependencyError, InputError, UnsupportedError
 from autostereo.render import render_views
 from autostereo.scene.appearance import Material
@@ -205,6 +208,13 @@ def test_report_prints_and_saves_every_benchmark(clockwork, tmp_path, capsys):
     printed = capsys.readouterr().out
     assert "scaled × 16" in printed and "lit per" not in printed and "OpenGL" not in printed
     assert "0 of 0 bars met" in printed  # quick: held to no bar
+
+
+@pytest.mark.parametrize("name", report.SUITES)
+def test_the_remark_on_compiling_looks_for_kernels_that_exist(name):
+    sources = [path.read_text() for path in Path(jit.__file__).parent.glob("*.py")]
+    for kernel in bench.KERNELS[name]:
+        assert any(f"\ndef {kernel}" in source for source in sources), kernel
 
 
 # --- small functions -------------------------------------------------------------------------------------------------
