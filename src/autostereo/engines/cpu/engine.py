@@ -31,6 +31,11 @@ class Prepared:
     memory: Memory = field(default_factory=Memory)
     lock: threading.Lock = field(default_factory=threading.Lock)
 
+    @property
+    def all_volumes(self) -> list[Volume]:
+        """The volumes of the scene."""
+        return [] if self.volumes is None else self.volumes.volumes
+
 
 class CpuEngine:
     """Draws meshes and volumes; see engines.engine.Engine.
@@ -83,14 +88,14 @@ class CpuEngine:
     def _draw_stages(self, prepared: Prepared, draw: Draw, target: Target) -> None:
         panel = draw.viewmap is not None
         shape = target.color.shape if panel else target.color.shape[:3]
-        opaque = prepared.meshes is not None
+        several = prepared.meshes is not None or any(v.mode == "iso" for v in prepared.all_volumes)
         depth = target.depth
-        if depth is None and opaque:
+        if depth is None and several:
             depth = prepared.memory.buffer("depth", shape, np.float32)
         if prepared.meshes is not None:
             stage = Target(target.color, depth)
-            one = draw_mesh_panel if panel else draw_mesh_views
-            one(prepared.meshes, draw, stage, prepared.memory)
+            draw_meshes = draw_mesh_panel if panel else draw_mesh_views
+            draw_meshes(prepared.meshes, draw, stage, prepared.memory)
             target.covered, target.reused = target.covered + stage.covered, target.reused + stage.reused
         else:
             background = np.array([background_word(prepared.scene)]).view(np.uint8)
@@ -99,8 +104,9 @@ class CpuEngine:
                 depth[...] = np.inf
         if prepared.volumes is not None:
             ends = np.empty((0, 0, 0), np.float32) if depth is None else depth
-            two = draw_volume_panel if panel else draw_volume_views
-            two(prepared.volumes, draw, target.color, ends, prepared.memory)
+            draw_volumes = draw_volume_panel if panel else draw_volume_views
+            for opaque in (True, False):
+                draw_volumes(prepared.volumes, opaque, draw, target.color, ends, prepared.memory)
 
     def interlace(self, views: NDArray[np.uint8], draw: Draw, out: NDArray[np.uint8]) -> None:
         """Gather a panel from its V views."""

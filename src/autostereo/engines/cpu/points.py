@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -14,14 +14,14 @@ from ...scene.scene import Scene
 from ..engine import Draw
 from .memory import Memory
 from .mesh_setup import CameraNumbers, camera_numbers
-from .points_setup import WORDS, Grid, View, count_bins, count_keys, fill_bins, fill_order, place_surfels
-from .points_views import FLOAT_ROWS, INT_ROWS, PAD, PLANE, PLANES, VIEWS_AT_ONCE, Scratch, Splats, splat_views
+from .points_setup import WORDS, Grid, View, fill_bins, place_surfels
+from .points_block import Splats
+from .points_views import FLOAT_ROWS, INT_ROWS, PAD, PLANE, PLANES, VIEWS_AT_ONCE, Scratch, splat_views
 from .mesh_shade import STRIDE
 from .scene_arrays import light_array
 from .threads import run_rows
 
 SAMPLES = 12_000  # of a block of views: with what else a block touches they stay in L2
-SURFELS = 4096  # that a thread takes at a time
 
 
 class PointArrays(NamedTuple):
@@ -93,7 +93,7 @@ def new_scratch() -> Scratch:
 def splats_at(
     arrays: PointArrays, scene: Scene, draw: Draw, frame: tuple[CameraNumbers, Grid], buffers: Memory
 ) -> Splats:
-    """Bring surfels before the camera, light, cull, sort and bin them; frame = (camera, grid)."""
+    """Bring surfels before the camera, light, cull and bin them; frame = (camera, grid)."""
     camera, grid = frame
     count = len(arrays.positions)
     lights, own_eye = light_array(scene, draw.camera), draw.options.shading != "center"
@@ -102,68 +102,27 @@ def splats_at(
     view = View(e, turn, float(draw.culling[0]), float(draw.culling[1]), lights, own_eye)
     records = buffers.buffer("surfels", (count, WORDS), np.float32)
     ranges = buffers.buffer("surfel ranges", (count, 4), np.int32)
-    keys = buffers.buffer("surfel keys", (count,), np.int32)
     words = records.view(np.int32)
-    found: list[tuple[int, int]] = []
+
+    # a few chunks, each with its own cursors: bins are filled in parallel and keep the order of surfels
+    chunks = max(1, min(8 * numba.get_num_threads(), count // 4096))
+    edges = np.linspace(0, count, chunks + 1).astype(np.int64)
+    blocks = -(-int(camera.height) // grid.rows) * grid.blocks
+    counts = np.zeros((chunks, blocks), np.int64)
 
     def place(first: int, end: int) -> None:
-        found.append(place_surfels((first, end), arrays, view, camera, grid, records, words, ranges, keys))
+        for c in range(first, end):
+            place_surfels((edges[c], edges[c + 1]), arrays, view, camera, grid, records, words, ranges, counts[c])
 
-    run_rows(count, place, SURFELS)
-    least, greatest = min(low for low, _ in found), max(high for _, high in found)
-    order = buffers.buffer("surfel order", (count,), np.int32)
-    first = np.zeros(2, np.int64)
-    if greatest >= 0:
-        first = counting_sort(
-            count,
-            greatest - least + 1,
-            lambda span, counts: count_keys(span, keys, least, counts),
-            lambda span, cursor: fill_order(span, keys, least, cursor, order),
-        )
+    run_rows(chunks, place, 1)
+    bin_start = np.zeros(blocks + 1, np.int64)
+    np.cumsum(counts.sum(axis=0), out=bin_start[1:])
+    cursors = bin_start[:-1] + np.cumsum(counts, axis=0) - counts
+    bins = buffers.buffer("surfel bins", (max(int(bin_start[-1]), 1),), np.int32)
 
-    held: list[NDArray[np.int32]] = []
+    def fill(first: int, end: int) -> None:
+        for c in range(first, end):
+            fill_bins((edges[c], edges[c + 1]), ranges, grid.blocks, cursors[c], bins)
 
-    def make(total: int) -> None:
-        held.append(buffers.buffer("surfel bins", (max(total, 1),), np.int32))
-
-    bin_start = counting_sort(
-        int(first[-1]),
-        -(-int(camera.height) // grid.rows) * grid.blocks,
-        lambda span, counts: count_bins(span, order, ranges, grid.blocks, counts),
-        lambda span, cursor: fill_bins(span, order, ranges, grid.blocks, cursor, held[0]),
-        make,
-    )
-    bins = held[0]
-    seen = buffers.buffer("surfels seen", (len(bins),), np.bool_)
-    return Splats(records, words, bin_start, bins, seen, arrays.materials, lights, own_eye)
-
-
-def counting_sort(
-    count: int,
-    kinds: int,
-    count_span: Callable[[tuple[int, int], NDArray[np.int64]], Any],
-    fill_span: Callable[[tuple[int, int], NDArray[np.int64]], Any],
-    make: Callable[[int], Any] = lambda total: None,
-) -> NDArray[np.int64]:
-    """Sort `count` things into kinds, stably and in parallel; returns where each kind begins, and the end.
-
-    count_span(span, counts) counts the kinds of a span of things, fill_span(span, cursor) writes them from the
-    cursors of their kinds on; between them, make(total) is told the number of all.
-    """
-    chunks = max(1, min(2 * numba.get_num_threads(), count // SURFELS))
-    edges = np.linspace(0, count, chunks + 1).astype(np.int64)
-    counts = np.zeros((chunks, kinds), np.int64)
-
-    def each(step: Callable[[tuple[int, int], NDArray[np.int64]], Any], of: NDArray[np.int64]) -> None:
-        def task(first: int, end: int) -> None:
-            for c in range(first, end):
-                step((edges[c], edges[c + 1]), of[c])
-
-        run_rows(chunks, task, 1)
-
-    each(count_span, counts)
-    start = np.zeros(kinds + 1, np.int64)
-    np.cumsum(counts.sum(axis=0), out=start[1:])
-    make(int(start[-1]))
-    each(fill_span, start[:-1] + np.cumsum(counts, axis=0) - counts)
-    return start
+    run_rows(chunks, fill, 1)
+    return Splats(records, words, bin_start, bins, arrays.materials, lights, own_eye)

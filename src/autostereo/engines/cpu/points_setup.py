@@ -1,8 +1,7 @@
-"""Before splatting: bring surfels before the cameras, light them, sort them by depth and into blocks of the picture.
+"""Before splatting: bring surfels before the cameras, light them, sort them into blocks of the picture.
 
-Everything here happens once per frame for all views. The order in which surfels are blended is that of their depth,
-in steps of 1/1024, then that of their numbers: it is the same in every view, so that sums of weights are the same bits
-however many views are drawn at once.
+Everything here happens once per frame for all views. Surfels are blended in the order of their numbers: it is the same
+in every view, so that sums of weights are the same bits however many views are drawn at once.
 """
 
 from __future__ import annotations
@@ -23,7 +22,6 @@ MATERIAL = 4  # PARTS holds the number of its material from this bit on
 
 LEAST_RADIUS = 0.71  # pixels: every disc of it, just over √½, holds a pixel's centre
 LARGEST = 1e5  # radius as a multiple of depth: what is seen of a larger disc is seen of this one
-KEY_SHIFT = np.int32(13)  # a depth's float32 bits without these are its key: 1024 keys from d to 2·d
 
 
 class Grid(NamedTuple):
@@ -139,18 +137,17 @@ def light_surfel(place, normal, color, material, view, offset_y):
 
 
 @kernel
-def place_surfels(span, arrays, view, camera, grid, records, words, ranges, keys):
-    """Bring surfels span[0] … span[1] before the cameras: their records, ranges and keys; returns least, greatest key.
+def place_surfels(span, arrays, view, camera, grid, records, words, ranges, counts):
+    """Bring surfels span[0] … span[1] before the cameras, and count how many touch each block of the picture.
 
     records (N, 16) float32 and words, its bits as int32: see X, Y, …; ranges (N, 4) int32: bands and blocks of the
-    picture that they may touch from some camera, first and last + 1; keys (N,) int32: by depth, −1 for those out of
-    sight and those whose centre is in front of the near plane.
+    picture that they may touch from some camera, first and last + 1; none for those out of sight and those whose
+    centre is in front of the near plane; counts (bands·blocks,).
     """
     e, m = view.eye_from_world, view.turn
     scale = 1.0 / camera.focal
-    least, greatest = np.int32(2**31 - 1), np.int32(-1)
     for i in range(span[0], span[1]):
-        keys[i] = -1
+        ranges[i, 0], ranges[i, 1] = 0, 0
         wx, wy, wz = arrays.positions[i, 0], arrays.positions[i, 1], arrays.positions[i, 2]
         d = e[2, 0] * wx + e[2, 1] * wy + e[2, 2] * wz + e[2, 3]
         if not d >= camera.near:
@@ -218,46 +215,16 @@ def place_surfels(span, arrays, view, camera, grid, records, words, ranges, keys
         ranges[i, 0], ranges[i, 1] = int(row0) // grid.rows, (int(row1) - 1) // grid.rows + 1
         ranges[i, 2] = int(max(left, 0.0)) // grid.columns
         ranges[i, 3] = min(int(min(right, camera.width - 1.0)) // grid.columns + 1, grid.blocks)
-        key = np.float32(d).view(np.int32) >> KEY_SHIFT
-        keys[i] = key
-        least, greatest = min(least, key), max(greatest, key)
-    return least, greatest
-
-
-@kernel
-def count_keys(span, keys, least, counts):
-    """Count how many surfels of span[0] … span[1] have each key."""
-    for i in range(span[0], span[1]):
-        if keys[i] >= 0:
-            counts[keys[i] - least] += 1
-
-
-@kernel
-def fill_order(span, keys, least, cursor, order):
-    """Write the numbers of surfels span[0] … span[1] into their places by key."""
-    for i in range(span[0], span[1]):
-        if keys[i] >= 0:
-            k = keys[i] - least
-            order[cursor[k]] = i
-            cursor[k] += 1
-
-
-@kernel
-def count_bins(span, order, ranges, blocks, counts):
-    """Count how many surfels order[span[0]] … touch each block of the picture."""
-    for k in range(span[0], span[1]):
-        i = np.uint64(order[k])
         for band in range(ranges[i, 0], ranges[i, 1]):
             for block in range(ranges[i, 2], ranges[i, 3]):
-                counts[band * blocks + block] += 1
+                counts[band * grid.blocks + block] += 1
 
 
 @kernel
-def fill_bins(span, order, ranges, blocks, cursor, bins):
-    """Write the numbers of surfels order[span[0]] … into the bins of the blocks that they touch."""
-    for k in range(span[0], span[1]):
-        i = np.uint64(order[k])
+def fill_bins(span, ranges, blocks, cursor, bins):
+    """Write the numbers of surfels span[0] … span[1] into the bins of the blocks that they touch."""
+    for i in range(span[0], span[1]):
         for band in range(ranges[i, 0], ranges[i, 1]):
             for block in range(ranges[i, 2], ranges[i, 3]):
-                bins[cursor[band * blocks + block]] = np.int32(i)
+                bins[cursor[band * blocks + block]] = i
                 cursor[band * blocks + block] += 1

@@ -1,10 +1,10 @@
 """Surfels to a stack of views: a block of rows and columns of every view at a time, in cache.
 
-Twice over the surfels of a block, nearest first: the nearest depth of each sample, then the sums of weights and
+Twice over the surfels of a block: the nearest depth of each sample, then the sums of weights and
 weighted colours of those within ε of it (the 1+1 passes of Hübner 2007b, section 3.5.2, each of all views). A chord
 (points_chord) covers a short run of neighbouring samples of each view: where it lies is found for all views at once
-(SIMD over views), then the samples of a run are drawn together (SIMD over x). What is nowhere seen in the first pass
-is left out of the second.
+(SIMD over views), then the samples of a run are drawn together (SIMD over x). Between the passes the farthest depth
+of every few samples is taken, so that the second can leave out what is hidden in a view.
 """
 
 from __future__ import annotations
@@ -15,16 +15,19 @@ import numpy as np
 
 from .jit import inlined, kernel
 from .mesh_shade import ALPHA, ONE, STRIDE, ZERO, quantize, whole_steps
-from .points_chord import cut, depth_of, is_small, lens_of, light_at, shine_of, weight_of
-from .points_setup import A, B, BLUE, DEPTH, FRONT, GREEN, MATERIAL, ND, NX, NY, PARTS, REACH, RED
-from .points_setup import ROW0, ROW1, SMALL
+from .points_block import CLOSER, draw_surfels
+from .points_chord import depth_of, is_small, light_at, shine_of, weight_of
+from .points_setup import A, B, BLUE, DEPTH, FRONT, GREEN, ND, NX, NY, REACH, RED, SMALL
 
 VIEWS_AT_ONCE = 256
+HALF, TWO = np.float32(0.5), np.float32(2.0)
+SMALL_MADE, COLORS_MADE = 1, 2
 PLANE = np.uint64(16384 + 5 * 16)  # samples of a block; planes must not fall onto the same cache sets
-NEAREST, STOP, WEIGHT, SUM_R, SUM_G, SUM_B = (PLANE * np.uint64(k) for k in range(6))
-PLANES = 6
+NEAREST, STOP, WEIGHT, SUM_R, SUM_G, SUM_B, FARTHEST = (PLANE * np.uint64(k) for k in range(7))
+PLANES = 7
+CELL = 2  # there is a farthest depth for every 2² samples: of them …
+CELL_REACH = 12  # … and of those after them
 PAD = 16  # samples beyond a row's end that whole steps may touch
-STEP = np.int32(4)  # samples of a run that are drawn together
 
 # rows of the float32 scratch, one value per view
 LEFT, RIGHT, ACROSS, FIRST, SMALL_HERE, CR, CG, CB = (np.uint64(k * STRIDE) for k in range(8))
@@ -32,20 +35,6 @@ FLOAT_ROWS = 8
 # rows of the int32 scratch
 BASE, COUNT = (np.uint64(k * STRIDE) for k in range(2))
 INT_ROWS = 2
-
-
-class Splats(NamedTuple):
-    """The surfels in sight. records, words: see points_setup; bin_start (B + 1,), bins: numbers of each block's
-    surfels, nearest first; seen: scratch for each; materials (M, 4), lights (L, 8) float32; own_eye."""
-
-    records: np.ndarray
-    words: np.ndarray
-    bin_start: np.ndarray
-    bins: np.ndarray
-    seen: np.ndarray
-    materials: np.ndarray
-    lights: np.ndarray
-    own_eye: bool
 
 
 class Scratch(NamedTuple):
@@ -56,13 +45,23 @@ class Scratch(NamedTuple):
     ints: np.ndarray
 
 
-@inlined
-def record_of(records, i):
-    """The numbers of surfel i."""
-    return (
-        records[i, 0], records[i, 1], records[i, 2], records[i, 3], records[i, 4], records[i, 5], records[i, 6],
-        records[i, 7], records[i, 8], records[i, 9], records[i, 10], records[i, 11], records[i, 12],
-    )  # fmt: skip
+class Place(NamedTuple):
+    """What draw_chord reads of a block.
+
+    offsets (V + 15,) float32, the last one repeated, so that SIMD works in whole steps; first view and number of
+    views; columns first … end; samples from view to view; offset of the lens; see Splats for the rest.
+    """
+
+    offsets: np.ndarray
+    first_view: np.uint64
+    views: np.uint64
+    first: np.float32
+    end: np.float32
+    stride: np.int32
+    lens_offset: np.float32
+    materials: np.ndarray
+    lights: np.ndarray
+    own_eye: bool
 
 
 @inlined
@@ -73,28 +72,28 @@ def find_small(views, first_view, record, lens, offsets, lists):
 
 
 @inlined
-def find_colors(views, first_view, record, number, lens_offset, splats, offsets, lists):
+def find_colors(place, record, material, lists):
     """Colour of a surfel in each view."""
-    steps = whole_steps(views)
+    offsets, first_view, lights = place.offsets, place.first_view, place.lights
+    steps = whole_steps(place.views)
     red, green, blue = record[RED], record[GREEN], record[BLUE]
     for v in range(steps):
         lists[CR + v] = red
         lists[CG + v] = green
         lists[CB + v] = blue
-    materials, lights = splats.materials, splats.lights
-    specular, shininess = materials[number, 2], materials[number, 3]
-    if specular == ZERO or not splats.own_eye:
+    specular, shininess = place.materials[material, 2], place.materials[material, 3]
+    if specular == ZERO or not place.own_eye:
         return
     d = record[DEPTH]
-    place = (record[A] * d, record[B] * d, d)
+    centre = (record[A] * d, record[B] * d, d)
     normal = (record[NX], record[NY], record[ND])
     for k in range(lights.shape[0]):
-        light, faces = light_at(k, record, lens_offset, lights)
+        light, faces = light_at(k, record, place.lens_offset, lights)
         if not faces:
             continue
         red, green, blue = specular * lights[k, 4], specular * lights[k, 5], specular * lights[k, 6]
         for v in range(steps):
-            shine = shine_of(offsets[first_view + v], place, normal, light, shininess)
+            shine = shine_of(offsets[first_view + v], centre, normal, light, shininess)
             lists[CR + v] += shine * red
             lists[CG + v] += shine * green
             lists[CB + v] += shine * blue
@@ -102,7 +101,7 @@ def find_colors(views, first_view, record, number, lens_offset, splats, offsets,
 
 @inlined
 def find_runs(views, first_view, chord, depth, block, small, offsets, lists, ints):
-    """Where a chord lies in each view: its ends, the first sample of its run, its place and the number of steps.
+    """Where a chord lies in each view: its ends, the first sample of its run, its place and length.
 
     block = (first column, end column, sample_x, place of the row, samples from view to view); small: 1 or 0, only
     in views that are marked so; 2 in all.
@@ -122,15 +121,14 @@ def find_runs(views, first_view, chord, depth, block, small, offsets, lists, int
     for v in range(steps):
         end = min(max(np.ceil(lists[RIGHT + v] - sample_x), low), high)
         run = np.int32(end - lists[FIRST + v])
-        run = run if (small == np.float32(2.0)) | (lists[SMALL_HERE + v] == small) else np.int32(0)
+        run = run if (small == TWO) | (lists[SMALL_HERE + v] == small) else np.int32(0)
         ints[COUNT + v] = np.int32(np.int32(max(run, np.int32(0)) + np.int32(3)) & np.int32(-4))
         lists[FIRST + v] += sample_x
 
 
 @inlined
-def draw_nearest(views, chord, reach, lists, ints, planes):
-    """Keep the nearest depth of each sample; returns whether any sample may be seen, now or when all is drawn."""
-    seen = False
+def draw_nearest(views, chord, lists, ints, planes):
+    """Keep the nearest depth of each sample."""
     for v in range(views):
         place = np.uint64(ints[BASE + v])
         left, right, across, first = lists[LEFT + v], lists[RIGHT + v], lists[ACROSS + v], lists[FIRST + v]
@@ -139,10 +137,30 @@ def draw_nearest(views, chord, reach, lists, ints, planes):
             n, m = x - left, right - x
             depth, _ = depth_of(n, m, across, chord)
             nearest = planes[NEAREST + place + k]
-            covered = (n > ZERO) & (m > ZERO)
-            seen |= covered & (depth - reach <= nearest)
-            planes[NEAREST + place + k] = depth if covered & (depth < nearest) else nearest
-    return seen
+            planes[NEAREST + place + k] = depth if (n > ZERO) & (m > ZERO) & (depth < nearest) else nearest
+
+
+@inlined
+def find_farthest(samples, planes):
+    """The farthest depth of every few samples."""
+    for c in range(np.uint64(samples >> CELL)):
+        farthest = planes[NEAREST + (c << np.uint64(CELL))]
+        for k in range(1, CELL_REACH):
+            farthest = max(farthest, planes[NEAREST + (c << np.uint64(CELL)) + np.uint64(k)])
+        planes[FARTHEST + c] = farthest
+
+
+@inlined
+def drop_hidden(views, nearest, ints, planes):
+    """Leave out the views in which nothing as near as `nearest` is seen; returns whether there are others."""
+    for v in range(whole_steps(views)):
+        farthest = planes[FARTHEST + np.uint64(ints[BASE + v] >> np.int32(CELL))]
+        hidden = (nearest > farthest) & (ints[COUNT + v] <= np.int32(8))
+        ints[COUNT + v] = np.int32(0) if hidden else ints[COUNT + v]
+    most = np.int32(0)
+    for v in range(views):
+        most = max(most, ints[COUNT + v])
+    return most > 0
 
 
 @inlined
@@ -166,50 +184,33 @@ def add_weights(views, chord, reach, lists, ints, planes):
 
 
 @inlined
-def draw_surfels(blending, views, first_view, bounds, block, splats, camera, offsets, scratch):
-    """Draw the surfels of a block: their depths or, `blending`, their colours where they are seen.
+def draw_chord(place, blending, row, surfel, chord, done, scratch):
+    """Draw one chord in every view: its depths or, `blending`, its colours where they are seen. See draw_surfels.
 
-    bounds = (first row, end row, first entry, end entry); block = (first column, end column, samples from view to
-    view).
+    Returns which lists of the surfel are made.
     """
-    records, words, bins, seen = splats.records, splats.words, splats.bins, splats.seen
-    planes, lists, ints = scratch.planes, scratch.lists, scratch.ints
-    lens = lens_of(camera)
-    sample = np.float32(0.5)
-    stride = np.int32(block[2])
-    for entry in range(np.uint64(bounds[2]), np.uint64(bounds[3])):
-        if blending and not seen[entry]:
-            continue
-        i = np.uint64(bins[entry])
-        record = record_of(records, i)
-        parts = words[i, PARTS]
-        reach = record[REACH] * record[DEPTH]
-        mixed = (parts & SMALL) != 0 and (parts & FRONT) != 0
-        if mixed:
+    record, part, parts, material, lens = surfel
+    planes, lists, ints, offsets = scratch.planes, scratch.lists, scratch.ints, place.offsets
+    first_view, views = place.first_view, place.views
+    small = TWO
+    if parts & SMALL and parts & FRONT:
+        if not done & SMALL_MADE:
             find_small(views, first_view, record, lens, offsets, lists)
-        if blending:
-            number = np.uint64(parts >> MATERIAL)
-            find_colors(views, first_view, record, number, np.float32(camera.offset_y), splats, offsets, lists)
-        visible = False
-        for r in range(max(words[i, ROW0], bounds[0]), min(words[i, ROW1], bounds[1])):
-            y = np.float32(r) + sample
-            row = np.int32(r - bounds[0]) * np.int32(views) * stride
-            here = (np.float32(block[0]), np.float32(block[1]), sample, row, stride)
-            for bit in range(4):
-                part = 1 << bit
-                if parts & part == 0:
-                    continue
-                found, chord = cut(record, part, y, lens)
-                if not found:
-                    continue
-                small = (ONE if part == SMALL else ZERO) if mixed else np.float32(2.0)
-                find_runs(views, first_view, chord, record[DEPTH], here, small, offsets, lists, ints)
-                if blending:
-                    add_weights(views, chord, reach, lists, ints, planes)
-                else:
-                    visible |= draw_nearest(views, chord, reach, lists, ints, planes)
-        if not blending:
-            seen[entry] = visible
+            done |= SMALL_MADE
+        small = ONE if part == SMALL else ZERO
+    begin = np.int32(row) * np.int32(views) * place.stride
+    block = (place.first, place.end, HALF, begin, place.stride)
+    find_runs(views, first_view, chord, record[DEPTH], block, small, offsets, lists, ints)
+    if not blending:
+        draw_nearest(views, chord, lists, ints, planes)
+        return done
+    reach = record[REACH] * record[DEPTH]
+    if drop_hidden(views, CLOSER * record[DEPTH] / max(chord[4], chord[5]) - reach, ints, planes):
+        if not done & COLORS_MADE:
+            find_colors(place, record, material, lists)
+            done |= COLORS_MADE
+        add_weights(views, chord, reach, lists, ints, planes)
+    return done
 
 
 @inlined
@@ -272,10 +273,14 @@ def splat_views(span, grid, splats, camera, offsets, scratch, color, depth):
         first_row, first_column = k // grid.blocks * grid.rows, k % grid.blocks * grid.columns
         rows = (first_row, min(first_row + grid.rows, height))
         columns = (first_column, min(first_column + grid.columns, width))
-        bounds, block = (rows[0], rows[1], start, end), (columns[0], columns[1], stride)
+        bounds = (rows[0], rows[1], start, end)
         for first in range(0, views, VIEWS_AT_ONCE):
             view, count = np.uint64(first), np.uint64(min(VIEWS_AT_ONCE, views - first))
+            low, high, lens_offset = np.float32(columns[0]), np.float32(columns[1]), np.float32(camera.offset_y)
+            materials, lights, own_eye = splats.materials, splats.lights, splats.own_eye
+            place = Place(offsets, view, count, low, high, np.int32(stride), lens_offset, materials, lights, own_eye)
             load_depths(rows, columns, count, stride, (height, width), view, depths, scratch.planes)
-            draw_surfels(False, count, view, bounds, block, splats, camera, offsets, scratch)
-            draw_surfels(True, count, view, bounds, block, splats, camera, offsets, scratch)
+            draw_surfels(draw_chord, place, False, bounds, splats, camera, scratch)
+            find_farthest((rows[1] - rows[0]) * np.int64(count) * stride, scratch.planes)
+            draw_surfels(draw_chord, place, True, bounds, splats, camera, scratch)
             store_samples(rows, columns, count, stride, (height, width), view, scratch.planes, colors, depths)

@@ -13,9 +13,13 @@ from ...scene.scene import Scene
 from ...scene.volume import Volume
 from ..engine import Camera, Draw
 from .memory import Memory
+from .mesh import panel_lines
+from .mesh_panel import Panel
+from .panel_lines import LinePlan
 from .mesh_setup import camera_numbers
 from .scene_arrays import light_array
 from .threads import run_rows
+from .volume_panel import PIXEL_ROWS, draw_panel_rays, draw_panel_rows
 from .volume_rays import BLOCK_ROWS, RAYS, ROW
 from .volume_sample import CHUNK, LIST, LIST_ROWS, SLABS, Cut, Planes, Slices
 from .volume_setup import (
@@ -29,9 +33,12 @@ from .volume_setup import (
     shown_blocks,
 )
 from .volume_shared import LINE, SLAB_ROWS, Shared
-from .volume_views import VIEWS_AT_ONCE, Ways, draw_rows, draw_shared_rows
+from .volume_modes import LEVELS
+from .volume_views import COMPOSITE, ISO, MIP, VIEWS_AT_ONCE, Ways, draw_rows, draw_shared_rows
 
+MODES = ("composite", "mip", "iso")  # in the order of volume_views
 FINE = (0.25, 0.5)
+MAX_PERIOD = 16  # pixels of a table's period, up to which its lines are drawn like views
 FINE_VIEWS = 2  # positions of a shared slab per pixel
 MAX_PLANES = 2**20
 
@@ -67,10 +74,10 @@ def make_slices(volumes: list[Volume], camera: Camera, step: float) -> Slices | 
 
 
 def make_cut(
-    prepared: PreparedVolumes, index: int, camera: Camera, slices: Slices, memory: Memory
+    prepared: PreparedVolumes, index: int, draw: Draw, slices: Slices, memory: Memory
 ) -> tuple[Cut, Ways]:
     """How volume `index` is cut, lit and classified in this frame."""
-    f = prepared.fields[index]
+    f, camera = prepared.fields[index], draw.camera
     volume = f.volume
     index_from_eye = np.linalg.inv(camera.eye_from_world @ volume.world_from_index)
     along = float(np.abs(index_from_eye[:3, 0]).max())  # voxels per unit of X
@@ -86,10 +93,10 @@ def make_cut(
         lambda: make_table(volume.transfer, *volume.value_range, slices.distance),
     )
     lights, m = light_array(prepared.scene, camera), volume.material
-    channels, colors = 0, 0
+    channels, light_colors = 0, 0
     if f.grid.words.size:
-        colors = 3 if np.ptp(lights[:, 4:7], axis=1).any() else 1
-        channels = colors * (2 if m.specular > 0 else 1)
+        light_colors = 3 if np.ptp(lights[:, 4:7], axis=1).any() else 1
+        channels = light_colors * (2 if m.specular > 0 else 1)
     cut = Cut(
         f.grid.scalars,
         f.grid.words,
@@ -104,12 +111,25 @@ def make_cut(
         np.ascontiguousarray(camera.eye_from_world[:3, :3], dtype=np.float32),
         lights,
         channels,
-        colors,
+        light_colors,
         (1.0 - m.ambient) / max(m.diffuse, 1e-6),
         float(m.shininess),
         camera.offset_y,
     )
-    return cut, Ways(table, (m.ambient, m.diffuse, m.specular), (channels, colors))
+    mode = MODES.index(volume.mode)
+    colors, level = np.zeros((1, 4), np.float32), 0.0
+    if mode == MIP:
+        colors = volume.transfer.evaluate(np.linspace(*volume.value_range, LEVELS)).astype(np.float32)
+        colors[:, 3] /= max(volume.transfer.max_opacity, 1e-30)
+    elif mode == ISO:
+        assert volume.iso is not None
+        colors[0] = volume.transfer.evaluate(volume.iso)
+        level = ((volume.iso - f.first_value) / f.value_step - low) * cut.scale
+    own_eyes = draw.options.shading != "center" and (mode == ISO or draw.options.volume == "exact")
+    light = (channels, light_colors)
+    return cut, Ways(
+        mode, table, (m.ambient, m.diffuse, m.specular), light, np.ascontiguousarray(colors), level, volume.shade, own_eyes
+    )
 
 
 def samples_of(prepared: PreparedVolumes, index: int, camera: Camera, cut: Cut) -> int:
@@ -131,38 +151,53 @@ def new_planes(samples: int, slices: Slices, channels: int) -> Planes:
     )
 
 
+def volume_groups(prepared: PreparedVolumes, opaque: bool) -> list[list[int]]:
+    """Which volumes are drawn together: each isosurface, or all that compose and each of the greatest values."""
+    modes = [v.mode for v in prepared.volumes]
+    if opaque:
+        return [[k] for k, mode in enumerate(modes) if mode == "iso"]
+    composite = [k for k, mode in enumerate(modes) if mode == "composite"]
+    return ([composite] if composite else []) + [[k] for k, mode in enumerate(modes) if mode == "mip"]
+
+
 def draw_volume_views(
-    prepared: PreparedVolumes, draw: Draw, color: NDArray[np.uint8], depth: NDArray[np.float32], memory: Memory
+    prepared: PreparedVolumes, opaque: bool, draw: Draw, color: NDArray[np.uint8], depth: NDArray[np.float32], memory: Memory
 ) -> None:
-    """Draw volumes over color (V, H, W, 4), where depth (V, H, W), if it has a size, ends rays."""
-    camera = draw.camera
-    slices = make_slices(prepared.volumes, camera, draw.options.step)
+    """Draw isosurfaces (opaque), or all else, over color (V, H, W, 4); depth (V, H, W), if it has a size, ends rays."""
+    camera, options = draw.camera, draw.options
+    slices = make_slices(prepared.volumes, camera, options.step)
     if slices is None:
         return
     numbers = camera_numbers(camera)
     views, height, width, _ = color.shape
-    for index in range(len(prepared.fields)):
-        cut, ways = make_cut(prepared, index, camera, slices, memory)
-        if draw.options.volume == "shared" and views > 1 and not draw.options.depth and depth.size == 0:
-            _draw_shared(cut, ways, draw, slices, samples_of(prepared, index, camera, cut), color, memory)
+    wants_depth = depth.size > 0 and (opaque or options.depth)
+    for group in volume_groups(prepared, opaque):
+        made = [make_cut(prepared, index, draw, slices, memory) for index in group]
+        cuts, ways = tuple(cut for cut, _ in made), tuple(way for _, way in made)
+        counts = [samples_of(prepared, index, camera, cut) for index, cut in zip(group, cuts, strict=True)]
+        composite = ways[0].mode == COMPOSITE
+        if composite and len(group) == 1 and options.volume == "shared" and views > 1 and depth.size == 0:
+            _draw_shared(cuts[0], ways[0], draw, slices, counts[0], color, memory)
             continue
-        own_eyes = draw.options.volume == "exact" and draw.options.shading != "center" and cut.channels > cut.colors
-        samples, channels = samples_of(prepared, index, camera, cut), ways.light[0]
-        count = min(VIEWS_AT_ONCE, views) * -(-width // RAYS) * BLOCK_ROWS * ROW
+        own_eyes = ways[0].own_eyes and any(way.light[0] > way.light[1] for way in ways)
+        together = min(1 if own_eyes and composite else VIEWS_AT_ONCE, views)
+        count = together * -(-width // RAYS) * BLOCK_ROWS * ROW
+        channels = [way.light[0] for way in ways]
         pool = memory.pool(
-            (("volume rays", index), samples, slices.slabs, channels, count),
-            lambda samples=samples, channels=channels, count=count: (
-                new_planes(samples, slices, channels),
+            (("volume rays", *group), *counts, slices.slabs, *channels, count),
+            lambda counts=counts, channels=channels, count=count: (
+                tuple(new_planes(n, slices, c) for n, c in zip(counts, channels, strict=True)),
                 np.zeros(count, np.float32),
                 np.zeros(ROW, np.int32),
             ),
         )
 
-        def task(first: int, end: int, cut: Cut = cut, ways: Ways = ways, pool: Any = pool) -> None:
+        def task(
+            first: int, end: int, cuts: Any = cuts, ways: Any = ways, pool: Any = pool, together: int = together
+        ) -> None:
             with pool as (planes, rays, packed):
-                together = 1 if own_eyes else VIEWS_AT_ONCE
-                args = (ways, draw.offsets, together, own_eyes, draw.options.depth, planes, rays, packed)
-                draw_rows((first, end), cut, numbers, slices, *args, color, depth)
+                args = (ways, draw.offsets, together, wants_depth, planes, rays, packed)
+                draw_rows((first, end), cuts, numbers, slices, *args, color, depth)
 
         run_rows(height, task)
 
@@ -203,6 +238,60 @@ def _draw_shared(
 
 
 def draw_volume_panel(
-    prepared: PreparedVolumes, draw: Draw, color: NDArray[np.uint8], depth: NDArray[np.float32], memory: Memory
+    prepared: PreparedVolumes, opaque: bool, draw: Draw, color: NDArray[np.uint8], depth: NDArray[np.float32], memory: Memory
 ) -> None:
-    raise NotImplementedError
+    """Draw isosurfaces (opaque), or all else, over a panel color (H, W, 3); depth (H, W, 3) likewise."""
+    camera, options = draw.camera, draw.options
+    slices = make_slices(prepared.volumes, camera, options.step)
+    if slices is None:
+        return
+    assert draw.viewmap is not None
+    plan, width = panel_lines(draw, memory), camera.width
+    panel = Panel(plan, draw.flip_x, draw.flip_y, options.sampling == "subpixel")
+    averaged = options.alpha == "averaged"
+    numbers = camera_numbers(camera)
+    for group in volume_groups(prepared, opaque):
+        made = [make_cut(prepared, index, draw, slices, memory) for index in group]
+        cuts, ways = tuple(cut for cut, _ in made), tuple(way for _, way in made)
+        counts = [samples_of(prepared, index, camera, cut) for index, cut in zip(group, cuts, strict=True)]
+        shared = ways[0].mode == COMPOSITE and len(group) == 1
+        shared = shared and (averaged or (options.volume == "shared" and depth.size == 0))
+        period = plan.period if draw.viewmap.table is not None and plan.period <= MAX_PERIOD and not averaged else 0
+        pool = _panel_pool(group, counts, [way.light[0] for way in ways], draw, slices, plan, period if shared else -1, memory)
+
+        def task(
+            first: int, end: int, cuts: Any = cuts, ways: Any = ways, pool: Any = pool, shared: bool = shared, period: int = period
+        ) -> None:
+            with pool as (planes, slabs, scratch):
+                if shared:
+                    args = (panel, period, averaged, planes[0], slabs, scratch, color)
+                    draw_panel_rows((first, end), cuts[0], numbers, slices, ways[0], *args)
+                else:
+                    args = (panel, opaque and depth.size > 0, planes, scratch, color, depth)
+                    draw_panel_rays((first, end), cuts, numbers, slices, ways, *args)
+
+        run_rows(camera.height, task)
+
+
+def _panel_pool(
+    group: list[int], counts: list[int], channels: list[int], draw: Draw, slices: Slices, plan: LinePlan, period: int, memory: Memory
+) -> Any:
+    """Threads' memory for a panel; period: of lines, 0 where every sub-pixel is on its own, −1 without shared slabs."""
+    camera, width = draw.camera, draw.camera.width
+    blocks = 3 * -(-width // RAYS)
+
+    def make() -> Any:
+        scratch = (
+            np.zeros(3 * width, np.float32),
+            np.zeros(width, np.float64),
+            np.zeros(BLOCK_ROWS * ROW * (blocks if period < 0 else 1), np.float32),
+            np.zeros(ROW, np.int32),
+            np.zeros(3 * max(period, 0) * SLAB_ROWS * LINE, np.float32),
+            np.zeros(PIXEL_ROWS * ROW * blocks if period == 0 else 0, np.float32),
+        )
+        reach = np.array([plan.low, plan.high])
+        slabs = new_shared(camera, slices, reach, 1, max(period, 1)) if period >= 0 else None
+        return tuple(new_planes(n, slices, c) for n, c in zip(counts, channels, strict=True)), slabs, scratch
+
+    key = (("volume panel", *group), *counts, *channels, period, width, slices, camera.fx, camera.focal)
+    return memory.pool((*key, plan.low, plan.high), make)

@@ -17,9 +17,9 @@ RAYS = 64  # of a block
 ROW = 80  # distance of a block's rows
 (
     ORIGIN, TURN, ENTER, LEAVE, LENGTH, T, R, G, B, HALF, FRONT, BACK, OPTICAL, SHARE,
-    PART, LEFT, RIGHT, FRONT_LIGHT, BACK_LIGHT,
-) = (np.uint64(k * ROW) for k in (*range(18), 23))  # fmt: skip
-BLOCK_ROWS = 29
+    PART, LEFT, RIGHT, END, FRONT_LIGHT, BACK_LIGHT,
+) = (np.uint64(k * ROW) for k in (*range(19), 24))  # fmt: skip
+BLOCK_ROWS = 30
 ZERO, ONE, HALF_WAY = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 TEN_BITS, COLOR_STEP = np.int32(1023), np.float32(1.0 / 1023.0)
 OPAQUE = np.float32(1.0 / 512.0)
@@ -27,12 +27,13 @@ OPAQUE = np.float32(1.0 / 512.0)
 
 @inlined
 def ray_stretch(n, base, cut, row, near, rays):
-    """Depths where rays of a block enter and leave what is seen of a volume; LEAVE holds where they end.
+    """Depths where rays of a block enter and leave what is seen of a volume before END.
 
     ORIGIN is the X of a ray's eye, TURN its X per depth.
     """
     for i in range(n):
         rays[base + ENTER + i] = np.float32(near)
+        rays[base + LEAVE + i] = rays[base + END + i]
     m, slope, lens = cut.index, row[0], row[1]
     for h in range(cut.halves.shape[0]):
         a, b, c, d = cut.halves[h, 0], cut.halves[h, 1], cut.halves[h, 2], cut.halves[h, 3]
@@ -163,17 +164,24 @@ def find_half(n, base, depth, distance, rays):
 
 
 @inlined
-def block_span(n, base, depth, cut, rays):
-    """Least and greatest sample of a slice near which a block's rays pass."""
-    least, most = np.float32(1e30), np.float32(-1e30)
-    d = np.float32(depth)
+def block_bounds(n, base, rays):
+    """Least and greatest ORIGIN and TURN of a block's rays."""
+    low, high = rays[base + ORIGIN], rays[base + ORIGIN]
+    least, most = rays[base + TURN], rays[base + TURN]
     for i in range(n):
-        x = rays[base + ORIGIN + i] + d * rays[base + TURN + i]
-        least, most = min(least, x), max(most, x)
-    count = np.float64(1 << 24)
-    first = min(max((least - cut.first) / cut.step, -1.0), count)
-    last = min(max((most - cut.first) / cut.step, -1.0), count)
-    return np.int64(first), np.int64(last) + 1
+        low, high = min(low, rays[base + ORIGIN + i]), max(high, rays[base + ORIGIN + i])
+        least, most = min(least, rays[base + TURN + i]), max(most, rays[base + TURN + i])
+    return np.float64(low), np.float64(high), np.float64(least), np.float64(most)
+
+
+@inlined
+def seen(bounds, depth, cut, marks, k):
+    """Whether rays within block_bounds pass near marked samples of slice k."""
+    low, high, least, most = bounds
+    inverse, count = 1.0 / cut.step, np.float64(1 << 24)
+    first = min(max((low + depth * least - cut.first) * inverse, -1.0), count)
+    last = min(max((high + depth * most - cut.first) * inverse, -1.0), count)
+    return any_marked(marks, k, np.int64(first), np.int64(last) + 1)
 
 
 @kernel
@@ -186,11 +194,11 @@ def march(n, base, cut, slices, first, last, table, material, light, wants_half,
         deepest = max(deepest, rays[base + T + i])
     if deepest < OPAQUE:
         return
+    bounds = block_bounds(n, base, rays)
     for k in range(first, last):
         depth = slices.first + k * slices.distance
-        a0, a1 = block_span(n, base, depth, cut, rays)
-        b0, b1 = block_span(n, base, depth + slices.distance, cut, rays)
-        if not (any_marked(planes.marks, k, a0, a1) or any_marked(planes.marks, k + 1, b0, b1)):
+        after = depth + slices.distance
+        if not (seen(bounds, depth, cut, planes.marks, k) or seen(bounds, after, cut, planes.marks, k + 1)):
             fresh = False
             continue
         if not fresh:

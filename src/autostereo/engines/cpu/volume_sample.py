@@ -100,9 +100,8 @@ def mark_runs(cut, row, slices, marks, wanted):
     marked = 0
     runs = marks.shape[1]
     half = 0.5 * (1 << CHUNK) * cut.step
-    margin = np.empty(3)
-    for a in range(3):
-        margin[a] = abs(cut.index[a, 0]) * half + 1.0
+    m = cut.index
+    margin = (abs(m[0, 0]) * half + 1.0, abs(m[1, 0]) * half + 1.0, abs(m[2, 0]) * half + 1.0)
     nx, ny, nz = cut.shape[0], cut.shape[1], cut.shape[2]
     wanted[: slices.slabs + 1] = 0
     for k in range(slices.slabs + 1):

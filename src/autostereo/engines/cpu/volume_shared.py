@@ -5,8 +5,8 @@ camera, shifted and linearly interpolated: contiguous loads, no tables, no gathe
 slabs are sampled `fine` times as densely as pixels. Position m of a slab lies at x = begin + m/fine; it is kept at
 [m mod phases][m div phases], so that what lies `phases` positions apart, such as a view's pixels, is contiguous.
 
-Slabs have their nominal length here. Seen obliquely they are longer by a factor that is constant along a ray: the
-transmittance of a ray is that power of the product, exactly; its colour is scaled alike (finish_rays).
+Slabs are as long here as the centre camera sees them. A view sees them a few percent longer or shorter, by about the
+same factor all along a ray: its transmittance is the product to that power, its colour is scaled alike (even_out).
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_shade import whole_steps
+from .mesh_shade import exp2_fast, log2_fast
 from .volume_rays import (
     B,
     G,
     HALF_WAY,
-    LEAVE,
+    END,
     LENGTH,
     ONE,
     OPTICAL,
@@ -39,15 +39,16 @@ from .volume_rays import (
     FRONT_LIGHT,
     ROW,
     blend,
-    block_span,
+    block_bounds,
     classify,
     ray_stretch,
     sample_fields,
+    seen,
     share_of_slab,
 )
-from .volume_sample import SLABS, any_marked
+from .volume_sample import SLABS
 
-LINE = 4096 + 80  # room for the positions of one phase, a constant so that rows are known not to overlap
+LINE = 16384 + 80  # room for the positions of one phase, a constant so that rows are known not to overlap
 RED, GREEN, BLUE, ALPHA = (np.uint64(k * LINE) for k in range(4))
 SLAB_ROWS = 4
 
@@ -79,12 +80,14 @@ def shift_of(camera, slices, k):
 def start_positions(n, base, first, step, camera, row, far, rays):
     """Rays of the centre camera through x = first + i·step."""
     inverse, half = np.float32(1.0 / camera.fx), np.float32(camera.centre_x - 0.5 - first)
+    slope = np.float32(row[0] * row[0] + 1.0)
     by = np.float32(step)
     for i in range(n):
         rays[base + ORIGIN + i] = ZERO
-        rays[base + TURN + i] = (np.float32(i) * by - half) * inverse
-        rays[base + LENGTH + i] = ONE
-        rays[base + LEAVE + i] = np.float32(far)
+        turn = (np.float32(i) * by - half) * inverse
+        rays[base + TURN + i] = turn
+        rays[base + LENGTH + i] = np.sqrt(slope + turn * turn)
+        rays[base + END + i] = np.float32(far)
 
 
 @kernel
@@ -102,13 +105,12 @@ def classify_slabs(cut, camera, row, slices, first, last, table, material, light
             x = shared.begin + (g * RAYS * shared.phases + phase) / shared.fine
             start_positions(n, base, x, shared.phases / shared.fine, camera, row, far, rays)
             ray_stretch(n, base, cut, row, slices.first, rays)
-            fresh = False
+            bounds, fresh = block_bounds(n, base, rays), False
             for k in range(first, last):
                 depth = slices.first + k * slices.distance
-                a0, a1 = block_span(n, base, depth, cut, rays)
-                b0, b1 = block_span(n, base, depth + slices.distance, cut, rays)
+                after = depth + slices.distance
                 place = np.uint64(((k - first) * shared.phases + phase) * SLAB_ROWS * LINE + g * RAYS)
-                if not (any_marked(planes.marks, k, a0, a1) or any_marked(planes.marks, k + 1, b0, b1)):
+                if not (seen(bounds, depth, cut, planes.marks, k) or seen(bounds, after, cut, planes.marks, k + 1)):
                     fresh = False
                     for c in range(4):
                         clear = place + np.uint64(c * LINE)
@@ -120,9 +122,10 @@ def classify_slabs(cut, camera, row, slices, first, last, table, material, light
                 values = planes.values[k - first + 1]
                 sample_fields(n, base, depth + slices.distance, cut, values, BACK, BACK_LIGHT, rays, packed)
                 share_of_slab(n, base, depth, slices.distance, rays)
-                classify(n, base, table.opacity, table.color, rays, packed)
+                classify(n, base, table.extinction, table.color, rays, packed)
                 for i in range(n):
-                    rays[base + SHARE + i] *= rays[base + OPTICAL + i]
+                    optical = rays[base + OPTICAL + i] * rays[base + SHARE + i] * rays[base + LENGTH + i]
+                    rays[base + SHARE + i] = ONE - exp2_fast(-optical)
                     rays[base + T + i] = ONE
                     rays[base + R + i] = ZERO
                     rays[base + G + i] = ZERO
@@ -201,6 +204,28 @@ def blend_view(offset, width, camera, slices, first, last, shared, t, line):
                     line,
                 )
             j = end
+
+
+@inlined
+def even_out(width, offset, middle, camera, row, t, line):
+    """Turn sums over slabs of the centre camera's lengths into those of a view's own.
+
+    The centre camera's rays are those through the same points at depth `middle`.
+    """
+    inverse, half = np.float32(1.0 / camera.fx), np.float32(camera.centre_x - 0.5)
+    turn, slope = np.float32(offset / camera.focal), np.float32(row[0] * row[0] + 1.0)
+    moved = np.float32(offset / middle)
+    for i in range(np.uint64(width)):
+        own = (np.float32(i) - half) * inverse - turn
+        centre = own + moved
+        through = line[t + ALPHA + i]
+        ratio = np.sqrt((slope + own * own) / (slope + centre * centre))
+        even = exp2_fast(ratio * log2_fast(max(through, np.float32(1e-30))))
+        scale = (ONE - even) / max(ONE - through, np.float32(1e-6))
+        line[t + RED + i] *= scale
+        line[t + GREEN + i] *= scale
+        line[t + BLUE + i] *= scale
+        line[t + ALPHA + i] = even
 
 
 @inlined

@@ -7,28 +7,82 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_shade import exp2_fast, log2_fast
+from .volume_modes import NONE, march_iso, march_mip, resolve_iso, resolve_mip
 from .volume_rays import (
-    B, BLOCK_ROWS, G, HALF, HALF_WAY, LEAVE, LENGTH, ONE, ORIGIN, R, RAYS, ROW, T, TURN, ZERO, march, ray_stretch,
+    B, BLOCK_ROWS, END, G, HALF, HALF_WAY, LENGTH, ONE, ORIGIN, R, RAYS, ROW, T, TURN, ZERO, march, ray_stretch,
 )  # fmt: skip
 from .volume_sample import SLABS, mark_runs, sample_slice
-from .volume_shared import ALPHA, BLUE, GREEN, LINE, RED, SLAB_ROWS, blend_view, classify_slabs, clear_line
+from .volume_shared import ALPHA, BLUE, GREEN, LINE, RED, SLAB_ROWS, blend_view, classify_slabs, clear_line, even_out
 
+COMPOSITE, MIP, ISO = 0, 1, 2
 VIEWS_AT_ONCE = 8  # whose rays stay in cache
 BYTE = np.float32(255.0)
 
 
 class Ways(NamedTuple):
-    """How a volume is drawn: table of slabs; material = (ambient, diffuse, specular); light = (channels, colours)."""
+    """How volumes are drawn.
 
+    mode: COMPOSITE, MIP or ISO; table: pre-integrated slabs; material = (ambient, diffuse, specular); light =
+    (channels, colours); colors: of all levels for MIP, in the first row that of an isosurface; level: of the surface,
+    as a row of the table; shade; own_eyes: highlights for a ray's own eye, not the centre's.
+    """
+
+    mode: int
     table: tuple
     material: tuple
     light: tuple
+    colors: np.ndarray
+    level: float
+    shade: bool
+    own_eyes: bool
+
+
+@inlined
+def clear_rays(n, base, mode, rays):
+    """Rays that have seen nothing yet."""
+    for i in range(n):
+        rays[base + T + i] = ONE
+        rays[base + R + i] = NONE if mode == MIP else ZERO
+        rays[base + G + i] = ZERO
+        rays[base + B + i] = ZERO
+        rays[base + HALF + i] = np.float32(np.inf)
+
+
+@kernel
+def march_volumes(blocks, cuts, row, slices, k, last, ways, wants_half, planes, rays, packed):
+    """Take blocks of rays through slabs k … last of all volumes, whose slices are at hand; see draw_rows."""
+    n = np.uint64(RAYS)
+    for v in range(len(cuts)):
+        cut, way = cuts[v], ways[v]
+        for b in range(blocks):
+            base = np.uint64(b * BLOCK_ROWS * ROW)
+            if k == 0 or len(cuts) > 1:
+                ray_stretch(n, base, cut, row, slices.first, rays)
+            if way.mode == MIP:
+                march_mip(n, base, cut, slices, k, last, planes[v], rays, packed)
+            elif way.mode == ISO:
+                march_iso(n, base, cut, slices, k, last, way.level, planes[v], rays, packed)
+            else:
+                args = (way.table, way.material, way.light, wants_half)
+                march(n, base, cut, slices, k, last, *args, planes[v], rays, packed)
+
+
+@kernel
+def resolve_rays(blocks, cut, row, slices, way, rays):
+    """Turn what rays found into colours, where that is not done on the way."""
+    for b in range(blocks):
+        base = np.uint64(b * BLOCK_ROWS * ROW)
+        if way.mode == MIP:
+            resolve_mip(np.uint64(RAYS), base, way.colors, rays)
+        elif way.mode == ISO:
+            color = (np.float64(way.colors[0, 0]), np.float64(way.colors[0, 1]), np.float64(way.colors[0, 2]))
+            args = (way.level, color, way.material, way.shade, way.own_eyes)
+            resolve_iso(RAYS, base, cut, row, slices, *args, rays)
 
 
 @inlined
 def start_rays(n, base, first, offset, camera, row, rays):
-    """Rays through pixels first … of a view at a camera offset; LEAVE is set by the caller."""
+    """Rays through pixels first … of a view at a camera offset."""
     o = np.float32(offset)
     inverse, half = np.float32(1.0 / camera.fx), np.float32(camera.centre_x - 0.5 - first)
     turn, slope = np.float32(offset / camera.focal), np.float32(row[0] * row[0] + 1.0)
@@ -37,11 +91,6 @@ def start_rays(n, base, first, offset, camera, row, rays):
         rays[base + ORIGIN + i] = o
         rays[base + TURN + i] = t
         rays[base + LENGTH + i] = np.sqrt(slope + t * t)
-        rays[base + T + i] = ONE
-        rays[base + R + i] = ZERO
-        rays[base + G + i] = ZERO
-        rays[base + B + i] = ZERO
-        rays[base + HALF + i] = np.float32(np.inf)
 
 
 @inlined
@@ -51,87 +100,85 @@ def over(front, through, behind):
 
 
 @inlined
-def finish_rays(n, base, rays, color, depth):
-    """Put what rays saw over the pixels color (n, 4), and the depth where they are half opaque before depth (n,)."""
+def finish_rays(n, base, rays, color):
+    """Put what rays saw over the pixels color (n, 4)."""
     for i in range(n):
         through = rays[base + T + i]
         color[i, 0] = over(rays[base + R + i], through, color[i, 0])
         color[i, 1] = over(rays[base + G + i], through, color[i, 1])
         color[i, 2] = over(rays[base + B + i], through, color[i, 2])
         color[i, 3] = over(ONE - through, through, color[i, 3])
-    for i in range(np.uint64(depth.shape[0])):
-        depth[i] = min(depth[i], rays[base + HALF + i])
 
 
 @kernel
-def next_slices(cut, eye, row, slices, first, last, planes):
+def next_slices(cut, eye, row, slices, first, last, chunk, planes):
     """Sample the slices of slabs first … last; that of the slabs before is at hand unless first is 0."""
     begin = first
     if first > 0:
-        planes.values[0] = planes.values[SLABS]
+        planes.values[0] = planes.values[chunk]
         begin = first + 1
     for k in range(begin, last + 1):
         sample_slice(cut, eye, row, slices, k, planes, k - first)
 
 
 @kernel
-def draw_rows(rows, cut, camera, slices, ways, offsets, together, own_eyes, wants_depth, planes, rays, packed, color, depth):
+def mark_volumes(cuts, row, slices, planes):
+    """Mark the runs of all volumes; returns how many there are."""
+    marked = 0
+    for v in range(len(cuts)):
+        marked += mark_runs(cuts[v], row, slices, planes[v].marks, planes[v].wanted)
+    return marked
+
+
+@kernel
+def draw_rows(rows, cuts, camera, slices, ways, offsets, together, wants_depth, planes, rays, packed, color, depth):
     """Draw rows (first, end) of every view, each along its own rays, over color (V, H, W, 4) and depth (V, H, W).
 
-    So many views together use the same slices, lit for the eye of the first (own_eyes) or of the centre.
+    cuts, ways, planes: of each volume; several take turns slab by slab. So many views together use the same slices,
+    lit for the eye of the first (own_eyes) or of the centre.
     """
     views, height, width, _ = color.shape
     blocks = -(-width // RAYS)
     far = slices.first + slices.slabs * slices.distance
-    opaque = depth.shape[0] > 0
+    opaque, n = depth.shape[0] > 0, np.uint64(RAYS)
+    chunk = SLABS if len(cuts) == 1 else 1
     for r in range(rows[0], rows[1]):
-        slope = (camera.centre_y - (r + 0.5)) / camera.fy - camera.offset_y / camera.focal
-        row = (slope, camera.offset_y)
-        if mark_runs(cut, row, slices, planes.marks, planes.wanted) == 0:
+        row = ((camera.centre_y - (r + 0.5)) / camera.fy - camera.offset_y / camera.focal, camera.offset_y)
+        if mark_volumes(cuts, row, slices, planes) == 0:
             continue
         for v0 in range(0, views, together):
-            v1, eye = min(v0 + together, views), offsets[v0] if own_eyes else 0.0
+            v1, eye = min(v0 + together, views), offsets[v0] if ways[0].own_eyes else 0.0
             for v in range(v0, v1):
                 for b in range(blocks):
-                    x, n = b * RAYS, np.uint64(min(RAYS, width - b * RAYS))
+                    x = b * RAYS
                     base = np.uint64(((v - v0) * blocks + b) * BLOCK_ROWS * ROW)
-                    start_rays(np.uint64(RAYS), base, x, offsets[v], camera, row, rays)
-                    for i in range(np.uint64(RAYS)):
-                        rays[base + LEAVE + i] = np.float32(far)
+                    start_rays(n, base, x, offsets[v], camera, row, rays)
+                    clear_rays(n, base, ways[0].mode, rays)
+                    for i in range(n):
+                        rays[base + END + i] = np.float32(far)
                     if opaque:
-                        for i in range(n):
-                            rays[base + LEAVE + i] = min(np.float32(far), depth[v, r, x + i])
-                    ray_stretch(np.uint64(RAYS), base, cut, row, slices.first, rays)
-            for k in range(0, slices.slabs, SLABS):
-                last = min(k + SLABS, slices.slabs)
-                next_slices(cut, eye, row, slices, k, last, planes)
-                for b in range((v1 - v0) * blocks):
-                    base = np.uint64(b * BLOCK_ROWS * ROW)
-                    n = np.uint64(RAYS)
-                    args = (ways.table, ways.material, ways.light, wants_depth)
-                    march(n, base, cut, slices, k, last, *args, planes, rays, packed)
+                        for i in range(np.uint64(min(RAYS, width - x))):
+                            rays[base + END + i] = min(np.float32(far), depth[v, r, x + i])
+            for k in range(0, slices.slabs, chunk):
+                last = min(k + chunk, slices.slabs)
+                for v in range(len(cuts)):
+                    next_slices(cuts[v], eye, row, slices, k, last, chunk, planes[v])
+                march_volumes((v1 - v0) * blocks, cuts, row, slices, k, last, ways, wants_depth, planes, rays, packed)
+            resolve_rays((v1 - v0) * blocks, cuts[0], row, slices, ways[0], rays)
             for v in range(v0, v1):
                 for b in range(blocks):
-                    x, n = b * RAYS, min(RAYS, width - b * RAYS)
+                    x = b * RAYS
+                    end = min(x + RAYS, width)
                     base = np.uint64(((v - v0) * blocks + b) * BLOCK_ROWS * ROW)
-                    line = depth[v, r, x : x + n] if wants_depth else depth[0, 0, :0] if opaque else np.empty(0, np.float32)
-                    finish_rays(np.uint64(n), base, rays, color[v, r, x : x + n], line)
+                    finish_rays(np.uint64(end - x), base, rays, color[v, r, x:end])
+                    if wants_depth:
+                        for i in range(np.uint64(end - x)):
+                            depth[v, r, x + i] = min(depth[v, r, x + i], rays[base + HALF + i])
 
 
 @inlined
-def finish_line(width, offset, camera, row, t, line, color):
-    """Put the sums of a view's pixels over color (W, 4), transmittance raised to the power of each ray's length."""
-    inverse, half = np.float32(1.0 / camera.fx), np.float32(camera.centre_x - 0.5)
-    turn, slope = np.float32(offset / camera.focal), np.float32(row[0] * row[0] + 1.0)
-    for i in range(np.uint64(width)):
-        a = (np.float32(i) - half) * inverse - turn
-        through = line[t + ALPHA + i]
-        oblique = exp2_fast(np.sqrt(slope + a * a) * log2_fast(max(through, np.float32(1e-30))))
-        scale = (ONE - oblique) / max(ONE - through, np.float32(1e-6))
-        line[t + RED + i] *= scale
-        line[t + GREEN + i] *= scale
-        line[t + BLUE + i] *= scale
-        line[t + ALPHA + i] = oblique
+def finish_line(width, t, line, color):
+    """Put the sums of a view's pixels over color (W, 4)."""
     for i in range(width):
         k = np.uint64(i)
         through = line[t + ALPHA + k]
@@ -154,10 +201,12 @@ def draw_shared_rows(rows, cut, camera, slices, ways, offsets, planes, shared, r
             clear_line(np.uint64(width), np.uint64(v * SLAB_ROWS * LINE), line)
         for k in range(0, slices.slabs, SLABS):
             last = min(k + SLABS, slices.slabs)
-            next_slices(cut, 0.0, row, slices, k, last, planes)
+            next_slices(cut, 0.0, row, slices, k, last, SLABS, planes)
             args = (ways.table, ways.material, ways.light, planes, shared, rays, packed)
             classify_slabs(cut, camera, row, slices, k, last, *args)
             for v in range(views):
                 blend_view(offsets[v], width, camera, slices, k, last, shared, v * SLAB_ROWS * LINE, line)
         for v in range(views):
-            finish_line(width, offsets[v], camera, row, np.uint64(v * SLAB_ROWS * LINE), line, color[v, r])
+            t, middle = np.uint64(v * SLAB_ROWS * LINE), slices.first + 0.5 * slices.slabs * slices.distance
+            even_out(width, offsets[v], middle, camera, row, t, line)
+            finish_line(width, t, line, color[v, r])

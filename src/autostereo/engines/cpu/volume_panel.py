@@ -1,0 +1,258 @@
+"""Volumes straight to an interlaced panel: every sub-pixel its own camera, no stack of views in between.
+
+Slabs are shared as in a stack of views. Where the mask is a table, sub-pixels one period apart see through the same
+camera: they are contiguous in slabs of as many phases, and one channel of them is blended like a view. Elsewhere
+every sub-pixel looks up its own two neighbours.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .jit import inlined, kernel
+from .panel_lines import row_offsets
+from .volume_rays import B, BLOCK_ROWS, END, G, HALF, LENGTH, ONE, ORIGIN, R, RAYS, ROW, T, TURN, ZERO
+from .volume_sample import SLABS, mark_runs
+from .volume_shared import ALPHA, LINE, RED, SLAB_ROWS, classify_slabs, next_run, shift_of
+from .volume_views import clear_rays, march_volumes, mark_volumes, next_slices, over, resolve_rays
+
+AT, MOVE, SHARE_R, CUT_R, A0, A1, C0, C1, SUM, THROUGH = (np.uint64(k * ROW) for k in range(10))
+PIXEL_ROWS = 10
+THIRD = np.float32(1.0 / 3.0)
+
+
+@inlined
+def blend_channel(n, near, beside, part, channel, t, values, line):
+    """Add one channel of n positions of a slab to a line's sums; see volume_shared.blend_run."""
+    for i in range(n):
+        c, a = values[near + channel + i], values[near + ALPHA + i]
+        c += part * (values[beside + channel + i] - c)
+        a += part * (values[beside + ALPHA + i] - a)
+        through = line[t + ALPHA + i]
+        line[t + RED + i] += through * c
+        line[t + ALPHA + i] = through - through * a
+
+
+@kernel
+def blend_line(x, offset, count, channel, camera, slices, first, last, shared, t, line):
+    """Add slabs first … last to one channel of the pixels x + i·phases, i < count, of a camera offset."""
+    phases, row = shared.phases, np.uint64(channel) * np.uint64(LINE)
+    for k in range(first, last):
+        at = (x - offset * shift_of(camera, slices, k) - shared.begin) * shared.fine
+        m = np.int64(np.floor(at))
+        part = np.float32(at - m)
+        q, phase = m // phases, m % phases
+        slab = (k - first) * phases
+        near = (slab + phase) * SLAB_ROWS * LINE
+        beside = (slab + phase + 1) * SLAB_ROWS * LINE if phase + 1 < phases else slab * SLAB_ROWS * LINE + 1
+        j = max(q, 0)
+        while True:
+            begin, end = next_run(shared, k - first, j)
+            begin, end = max(begin - 1, j), min(end, shared.count - 1)
+            i0, i1 = begin - q, min(end - q, count)
+            if i0 >= count or begin >= end:
+                break
+            if i1 > i0:
+                blend_channel(
+                    np.uint64(i1 - i0),
+                    np.uint64(near + begin),
+                    np.uint64(beside + begin),
+                    part,
+                    row,
+                    np.uint64(t + i0),
+                    shared.values,
+                    line,
+                )
+            j = end
+
+
+@inlined
+def fetch_pixels(n, base, slab, channel, last, values, pixels, index):
+    """One channel and the opacity of a slab at the places AT − MOVE·shift of sub-pixels; AT holds the place itself."""
+    for i in range(n):
+        at = min(max(pixels[base + CUT_R + i], ZERO), last)
+        m = np.floor(at)
+        pixels[base + SHARE_R + i] = at - m
+        index[i] = np.int32(m)
+    for i in range(n):
+        k = slab + np.uint64(index[i])
+        pixels[base + A0 + i], pixels[base + A1 + i] = values[k + ALPHA], values[k + ALPHA + np.uint64(1)]
+        pixels[base + C0 + i], pixels[base + C1 + i] = values[k + channel], values[k + channel + np.uint64(1)]
+    for i in range(n):
+        part = pixels[base + SHARE_R + i]
+        pixels[base + A0 + i] += part * (pixels[base + A1 + i] - pixels[base + A0 + i])
+        pixels[base + C0 + i] += part * (pixels[base + C1 + i] - pixels[base + C0 + i])
+
+
+@kernel
+def blend_pixels(blocks, averaged, camera, slices, first, last, shared, pixels, index):
+    """Add slabs first … last to the sub-pixels of a row, in blocks of 64 for each channel, each at its own place."""
+    n = np.uint64(RAYS)
+    stride = PIXEL_ROWS * ROW
+    bound = np.float32(shared.count * shared.phases - 2)
+    for b in range(blocks):
+        low, high = pixels[3 * b * stride + MOVE], pixels[3 * b * stride + MOVE]
+        left, right = pixels[3 * b * stride + AT], pixels[3 * b * stride + AT]
+        for c in range(3):
+            base = np.uint64((3 * b + c) * stride)
+            for i in range(n):
+                low, high = min(low, pixels[base + MOVE + i]), max(high, pixels[base + MOVE + i])
+                left, right = min(left, pixels[base + AT + i]), max(right, pixels[base + AT + i])
+        for k in range(first, last):
+            shift = np.float32(shift_of(camera, slices, k))
+            begin = left - max(low * shift, high * shift)
+            end = right - min(low * shift, high * shift)
+            seen = False
+            for g in range(max(int(begin), 0) // RAYS, min((int(end) + 1) // RAYS, shared.count // RAYS - 1) + 1):
+                seen = seen or shared.shown[k - first, g] != 0
+            if not seen:
+                continue
+            slab = np.uint64((k - first) * SLAB_ROWS * LINE)
+            for c in range(3):
+                base = np.uint64((3 * b + c) * stride)
+                for i in range(n):
+                    pixels[base + CUT_R + i] = pixels[base + AT + i] - pixels[base + MOVE + i] * shift
+                fetch_pixels(n, base, slab, np.uint64(c) * np.uint64(LINE), bound, shared.values, pixels, index)
+            if averaged:
+                red, green, blue = (
+                    np.uint64(3 * b * stride),
+                    np.uint64((3 * b + 1) * stride),
+                    np.uint64((3 * b + 2) * stride),
+                )
+                for i in range(n):
+                    mean = THIRD * (pixels[red + A0 + i] + pixels[green + A0 + i] + pixels[blue + A0 + i])
+                    pixels[red + A0 + i] = mean
+                    pixels[green + A0 + i] = mean
+                    pixels[blue + A0 + i] = mean
+            for c in range(3):
+                base = np.uint64((3 * b + c) * stride)
+                for i in range(n):
+                    through = pixels[base + THROUGH + i]
+                    pixels[base + SUM + i] += through * pixels[base + C0 + i]
+                    pixels[base + THROUGH + i] = through - through * pixels[base + A0 + i]
+
+
+@inlined
+def place_in_pixel(subpixel, c):
+    """Where in its pixel a channel is sampled, from the pixel's centre."""
+    return (c - 1) / 3.0 if subpixel else 0.0
+
+
+@kernel
+def draw_panel_rows(rows, cut, camera, slices, ways, panel, period, averaged, planes, shared, scratch, color):
+    """Draw rows (first, end) of the picture from shared slabs over the panel color (H, W, 3).
+
+    period: that of the table in pixels, or 0; scratch = (offsets (3·W,) float32, u (W,) float64, rays, index, line,
+    pixels).
+    """
+    offsets, u, rays, index, line, pixels = scratch
+    height, width, _ = color.shape
+    blocks = -(-width // RAYS)
+    stride = PIXEL_ROWS * ROW
+    middle = slices.first + 0.5 * slices.slabs * slices.distance
+    for r in range(rows[0], rows[1]):
+        row = ((camera.centre_y - (r + 0.5)) / camera.fy - camera.offset_y / camera.focal, camera.offset_y)
+        if mark_runs(cut, row, slices, planes.marks, planes.wanted) == 0:
+            continue
+        shown = height - 1 - r if panel.flip_y else r
+        row_offsets(shown, width, panel.flip_x, (0, width), 0, 0, width, panel.plan, u, offsets)
+        if period > 0:
+            for t in range(3 * period):
+                for i in range(-(-width // period)):
+                    line[np.uint64(t * SLAB_ROWS * LINE + i) + RED] = ZERO
+                    line[np.uint64(t * SLAB_ROWS * LINE + i) + ALPHA] = ONE
+        else:
+            for b in range(3 * blocks):
+                base, c = np.uint64(b * stride), b % 3
+                for i in range(RAYS):
+                    x = min((b // 3) * RAYS + i, width - 1)
+                    k = np.uint64(i)
+                    pixels[base + AT + k] = np.float32(x + place_in_pixel(panel.subpixel, c) - shared.begin)
+                    pixels[base + MOVE + k] = offsets[c * width + x]
+                    pixels[base + SUM + k] = ZERO
+                    pixels[base + THROUGH + k] = ONE
+        for k in range(0, slices.slabs, SLABS):
+            last = min(k + SLABS, slices.slabs)
+            next_slices(cut, 0.0, row, slices, k, last, SLABS, planes)
+            args = (ways.table, ways.material, ways.light, planes, shared, rays, index)
+            classify_slabs(cut, camera, row, slices, k, last, *args)
+            if period == 0:
+                blend_pixels(blocks, averaged, camera, slices, k, last, shared, pixels, index)
+            for t in range(3 * period):
+                x, c = t // 3, t % 3
+                count = -(-(width - x) // period) if x < width else 0
+                offset = np.float64(offsets[c * width + x]) if x < width else 0.0
+                at = x + place_in_pixel(panel.subpixel, c)
+                blend_line(at, offset, count, c, camera, slices, k, last, shared, t * SLAB_ROWS * LINE, line)
+        for c in range(3):
+            for x in range(width):
+                if period > 0:
+                    k = np.uint64(((x % period) * 3 + c) * SLAB_ROWS * LINE + x // period)
+                    total, through = line[k + RED], line[k + ALPHA]
+                else:
+                    k = np.uint64((3 * (x // RAYS) + c) * stride + x % RAYS)
+                    total, through = pixels[k + SUM], pixels[k + THROUGH]
+                if through < ONE:
+                    at = x + place_in_pixel(panel.subpixel, c)
+                    total, through = even_sub_pixel(at, offsets[c * width + x], middle, camera, row, total, through)
+                    column = width - 1 - x if panel.flip_x else x
+                    color[shown, column, c] = over(total, through, color[shown, column, c])
+
+
+@inlined
+def even_sub_pixel(x, offset, middle, camera, row, total, through):
+    """volume_shared.even_out for one sub-pixel."""
+    own = (x + 0.5 - camera.centre_x) / camera.fx - offset / camera.focal
+    centre, slope = own + offset / middle, 1.0 + row[0] * row[0]
+    ratio = np.sqrt((slope + own * own) / (slope + centre * centre))
+    even = np.float32(max(through, np.float32(1e-30)) ** ratio)
+    return total * ((ONE - even) / max(ONE - through, np.float32(1e-6))), even
+
+
+@kernel
+def draw_panel_rays(rows, cuts, camera, slices, ways, panel, wants_depth, planes, scratch, color, depth):
+    """Draw rows (first, end) of the picture, every sub-pixel along its own ray, over the panel color (H, W, 3).
+
+    cuts, ways, planes: of each volume, see volume_views.draw_rows; depth (H, W, 3) or of no size.
+    """
+    offsets, u, rays, index, _, _ = scratch
+    height, width, _ = color.shape
+    blocks, n = 3 * -(-width // RAYS), np.uint64(RAYS)
+    far = slices.first + slices.slabs * slices.distance
+    opaque = depth.shape[0] > 0
+    chunk = SLABS if len(cuts) == 1 else 1
+    for r in range(rows[0], rows[1]):
+        row = ((camera.centre_y - (r + 0.5)) / camera.fy - camera.offset_y / camera.focal, camera.offset_y)
+        if mark_volumes(cuts, row, slices, planes) == 0:
+            continue
+        shown = height - 1 - r if panel.flip_y else r
+        row_offsets(shown, width, panel.flip_x, (0, width), 0, 0, width, panel.plan, u, offsets)
+        for b in range(blocks):
+            base, c = np.uint64(b * BLOCK_ROWS * ROW), b % 3
+            clear_rays(n, base, ways[0].mode, rays)
+            for i in range(RAYS):
+                x, k = min((b // 3) * RAYS + i, width - 1), np.uint64(i)
+                o = np.float64(offsets[c * width + x])
+                at = x + place_in_pixel(panel.subpixel, c)
+                turn = (at + 0.5 - camera.centre_x) / camera.fx - o / camera.focal
+                rays[base + ORIGIN + k] = np.float32(o)
+                rays[base + TURN + k] = np.float32(turn)
+                rays[base + LENGTH + k] = np.float32(np.sqrt(1.0 + row[0] * row[0] + turn * turn))
+                rays[base + END + k] = np.float32(far)
+                if opaque:
+                    column = width - 1 - x if panel.flip_x else x
+                    rays[base + END + k] = min(np.float32(far), depth[shown, column, c])
+        for k in range(0, slices.slabs, chunk):
+            last = min(k + chunk, slices.slabs)
+            for v in range(len(cuts)):
+                next_slices(cuts[v], 0.0, row, slices, k, last, chunk, planes[v])
+            march_volumes(blocks, cuts, row, slices, k, last, ways, wants_depth, planes, rays, index)
+        resolve_rays(blocks, cuts[0], row, slices, ways[0], rays)
+        for x in range(width):
+            column = width - 1 - x if panel.flip_x else x
+            for c in range(3):
+                k = np.uint64((3 * (x // RAYS) + c) * BLOCK_ROWS * ROW + x % RAYS)
+                total = rays[k + R] if c == 0 else (rays[k + G] if c == 1 else rays[k + B])
+                color[shown, column, c] = over(total, rays[k + T], color[shown, column, c])
+                if wants_depth:
+                    depth[shown, column, c] = min(depth[shown, column, c], rays[k + HALF])
