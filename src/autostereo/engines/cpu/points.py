@@ -13,15 +13,23 @@ from ...scene.points import Points
 from ...scene.scene import Scene
 from ..engine import Draw
 from .memory import Memory
+from .mesh import new_block, panel_lines
+from .mesh_panel import Panel
 from .mesh_setup import CameraNumbers, camera_numbers
-from .points_setup import WORDS, Grid, View, fill_bins, place_surfels
+from .mesh_shade import FLOAT_ROWS, INT_ROWS, STRIDE
+from .panel_lines import line_capacity
 from .points_block import Splats
-from .points_views import FLOAT_ROWS, INT_ROWS, PAD, PLANE, PLANES, VIEWS_AT_ONCE, Scratch, splat_views
-from .mesh_shade import STRIDE
+from .points_panel import PLANE as PANEL_PLANE
+from .points_panel import PLANES as PANEL_PLANES
+from .points_panel import splat_panel
+from .points_setup import WORDS, Grid, View, fill_bins, place_surfels
+from .points_views import PAD, PLANE, PLANES, VIEWS_AT_ONCE, Scratch, splat_views
 from .scene_arrays import light_array
 from .threads import run_rows
 
 SAMPLES = 12_000  # of a block of views: with what else a block touches they stay in L2
+PANEL_SAMPLES = 12_288  # of a block of a panel, likewise
+PANEL_COLUMNS = 2048  # most pixels of a panel's block
 
 
 class PointArrays(NamedTuple):
@@ -69,9 +77,9 @@ def draw_points_views(
     """Splat surfels over color (V, H, W, 4) where they are nearer than eye depth (V, H, W); both are updated."""
     views, height, width = depth.shape
     grid, camera = view_grid(views, width, height), camera_numbers(draw.camera)
-    splats = splats_at(arrays, scene, draw, (camera, grid), buffers)
+    splats = splats_at(arrays, scene, draw, (camera, grid), buffers, (draw.offsets.min(), draw.offsets.max()))
     offsets = np.pad(draw.offsets.astype(np.float32), (0, 15), mode="edge")
-    pool = buffers.pool(("points",), new_scratch)
+    pool = buffers.pool(("points",), lambda: new_scratch(PLANES * int(PLANE)))
     out = color.view(np.int32).reshape(views, height, width)
 
     def task(first: int, end: int) -> None:
@@ -81,25 +89,60 @@ def draw_points_views(
     run_rows(-(-height // grid.rows) * grid.blocks, task)
 
 
-def new_scratch() -> Scratch:
+def draw_points_panel(
+    arrays: PointArrays, scene: Scene, draw: Draw, color: NDArray[np.uint8], depth: NDArray[np.float32], buffers: Memory
+) -> None:
+    """Splat surfels over color (H, W, 3) where they are nearer than eye depth (H, W, 3); both are updated.
+
+    Both are laid out as the panel shows them, mirrored by the draw's flips.
+    """
+    height, width, _ = depth.shape
+    plan, camera, grid = panel_lines(draw, buffers), camera_numbers(draw.camera), panel_grid(width, height)
+    splats = splats_at(arrays, scene, draw, (camera, grid), buffers, (plan.low, plan.high))
+    panel = Panel(plan, draw.flip_x, draw.flip_y, draw.options.sampling == "subpixel")
+    capacity = line_capacity(plan, grid.columns)
+    pool = buffers.pool(
+        ("points panel", grid, capacity),
+        lambda: (new_block(grid.rows, grid.columns, capacity), new_scratch(PANEL_PLANES * int(PANEL_PLANE))),
+    )
+
+    def task(first: int, end: int) -> None:
+        with pool as (block, scratch):
+            splat_panel((first, end), grid, splats, camera, panel, block, scratch, color, depth)
+
+    run_rows(-(-height // grid.rows) * grid.blocks, task)
+
+
+def panel_grid(width: int, height: int) -> Grid:
+    """Blocks for which the samples of a panel stay in cache."""
+    blocks = -(-width // PANEL_COLUMNS)
+    columns = (-(-width // blocks) + 15) // 16 * 16
+    return Grid(min(max(1, PANEL_SAMPLES // (3 * columns)), height), columns, blocks)
+
+
+def new_scratch(samples: int) -> Scratch:
     """One thread's memory."""
     return Scratch(
-        np.zeros(PLANES * int(PLANE), np.float32),
-        np.zeros(FLOAT_ROWS * STRIDE, np.float32),
-        np.zeros(INT_ROWS * STRIDE, np.int32),
+        np.zeros(samples, np.float32), np.zeros(FLOAT_ROWS * STRIDE, np.float32), np.zeros(INT_ROWS * STRIDE, np.int32)
     )
 
 
 def splats_at(
-    arrays: PointArrays, scene: Scene, draw: Draw, frame: tuple[CameraNumbers, Grid], buffers: Memory
+    arrays: PointArrays,
+    scene: Scene,
+    draw: Draw,
+    frame: tuple[CameraNumbers, Grid],
+    buffers: Memory,
+    offsets: tuple[float, float],
 ) -> Splats:
-    """Bring surfels before the camera, light, cull and bin them; frame = (camera, grid)."""
+    """Bring surfels before the camera, light, cull and bin them; frame = (camera, grid); range of offsets to draw."""
     camera, grid = frame
     count = len(arrays.positions)
     lights, own_eye = light_array(scene, draw.camera), draw.options.shading != "center"
     e = np.ascontiguousarray(draw.camera.eye_from_world, dtype=np.float64)
     turn = np.ascontiguousarray(np.linalg.inv(e[:3, :3]).T)
-    view = View(e, turn, float(draw.culling[0]), float(draw.culling[1]), lights, own_eye)
+    low, high = min(draw.culling[0], offsets[0]), max(draw.culling[1], offsets[1])
+    view = View(e, turn, float(low), float(high), lights, own_eye)
     records = buffers.buffer("surfels", (count, WORDS), np.float32)
     ranges = buffers.buffer("surfel ranges", (count, 4), np.int32)
     words = records.view(np.int32)

@@ -43,7 +43,8 @@ def draw_surfels(draw_chord, place, blending, bounds, splats, camera, scratch):
     """Call draw_chord(place, blending, row, surfel, chord, done, scratch) for every chord of a block's surfels.
 
     bounds = (first row, end row, first entry, end entry) of the block; row counts from the first; surfel = (record,
-    shape, shapes that it takes, material, lens); done: what the call before returned, 0 for a surfel's first chord.
+    number, shape, shapes that it takes, material, lens); done: what the call before returned, 0 for a surfel's first
+    chord.
     """
     records, words, bins = splats.records, splats.words, splats.bins
     lens = lens_of(camera)
@@ -60,5 +61,5 @@ def draw_surfels(draw_chord, place, blending, bounds, splats, camera, scratch):
                     continue
                 found, chord = cut(record, part, y, lens)
                 if found:
-                    surfel = (record, part, parts, material, lens)
+                    surfel = (record, np.int32(i), part, parts, material, lens)
                     done = draw_chord(place, blending, r - bounds[0], surfel, chord, done, scratch)

@@ -31,10 +31,8 @@ PAD = 16  # samples beyond a row's end that whole steps may touch
 
 # rows of the float32 scratch, one value per view
 LEFT, RIGHT, ACROSS, FIRST, SMALL_HERE, CR, CG, CB = (np.uint64(k * STRIDE) for k in range(8))
-FLOAT_ROWS = 8
 # rows of the int32 scratch
 BASE, COUNT = (np.uint64(k * STRIDE) for k in range(2))
-INT_ROWS = 2
 
 
 class Scratch(NamedTuple):
@@ -189,7 +187,7 @@ def draw_chord(place, blending, row, surfel, chord, done, scratch):
 
     Returns which lists of the surfel are made.
     """
-    record, part, parts, material, lens = surfel
+    record, _, part, parts, material, lens = surfel
     planes, lists, ints, offsets = scratch.planes, scratch.lists, scratch.ints, place.offsets
     first_view, views = place.first_view, place.views
     small = TWO

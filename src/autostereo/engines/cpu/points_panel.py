@@ -1,0 +1,287 @@
+"""Surfels straight to an interlaced panel: every sub-pixel its own camera offset, no stack of views in between.
+
+As points_views, but for each chord (points_chord) it is the lines of sub-pixels that it may meet, and the interval of
+each, that are found (panel_lines); these samples make one list, at whose exact offsets depths and weights are those
+of every other draw (SIMD over samples), and one scalar pass keeps what is nearest, or adds what is seen.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .jit import inlined, kernel
+from .mesh_panel import LINES_AT_ONCE, Block, find_intervals, place_samples
+from .mesh_shade import (
+    ADDRESS,
+    BASE,
+    CAPACITY,
+    KR,
+    LANE_OFFSET,
+    LANE_U,
+    LANE_X,
+    LANE_Z,
+    ONE,
+    RUN,
+    ZERO,
+    quantize,
+    whole_steps,
+)
+from .panel_lines import BUCKET, LinePlan, make_lines, row_offsets
+from .points_block import CLOSER, draw_surfels
+from .points_chord import depth_of, is_small, light_at, shine_of, weight_of
+from .points_setup import A, B, BLUE, DEPTH, FRONT, GREEN, ND, NX, NY, REACH, RED, SMALL
+
+PLANE = np.uint64(12288 + 5 * 16)  # samples of a block; planes must not fall onto the same cache sets
+NEAREST, STOP, WEIGHT, SUM, LAST, FARTHEST = (PLANE * np.uint64(k) for k in range(6))
+PLANES = 6
+CELL = 4  # there is a farthest depth for every 2⁴ samples of a channel
+FAR = np.float32(np.inf)
+NOBODY = np.int32(-1).view(np.float32)
+
+
+class Place(NamedTuple):
+    """What draw_chord reads of a block: its memory, first pixel and number of pixels, 3·columns samples a row.
+
+    at: see mesh_panel.Place; offset of the lens; see Splats for the rest.
+    """
+
+    block: Block
+    plan: LinePlan
+    first: int
+    columns: int
+    at: tuple
+    lens_offset: np.float32
+    materials: np.ndarray
+    lights: np.ndarray
+    own_eye: bool
+
+
+@inlined
+def list_depths(n, chord, depth, lists):
+    """Depths of the listed samples, infinite where the chord does not cover them."""
+    x1, p1, x2, p2 = chord[0], chord[1], chord[2], chord[3]
+    for i in range(n):
+        x, offset = lists[LANE_X + i], lists[LANE_OFFSET + i]
+        left, right = x1 + offset * p1, x2 + offset * p2
+        n_, m_ = x - left, right - x
+        at, _ = depth_of(n_, m_, (right - left) * depth, chord)
+        lists[LANE_Z + i] = at if (n_ > ZERO) & (m_ > ZERO) else FAR
+
+
+@inlined
+def list_weights(n, chord, depth, lists):
+    """Depths and weights of the listed samples."""
+    x1, p1, x2, p2 = chord[0], chord[1], chord[2], chord[3]
+    for i in range(n):
+        x, offset = lists[LANE_X + i], lists[LANE_OFFSET + i]
+        left, right = x1 + offset * p1, x2 + offset * p2
+        n_, m_ = x - left, right - x
+        at, inverse = depth_of(n_, m_, (right - left) * depth, chord)
+        lists[LANE_Z + i] = at if (n_ > ZERO) & (m_ > ZERO) else FAR
+        lists[LANE_U + i] = weight_of(n_, m_, inverse, chord)
+
+
+@inlined
+def mask_small(n, wanted, record, lens, lists):
+    """Put those of the listed samples out of reach that see a disc less than a pixel wide, or that do not."""
+    for i in range(n):
+        small = is_small(lists[LANE_OFFSET + i], record, lens)
+        lists[LANE_Z + i] = lists[LANE_Z + i] if small == wanted else FAR
+
+
+@inlined
+def list_colors(n, row, place, record, material, lists, ints):
+    """Colour of a surfel at the listed samples, each that of its own channel."""
+    begin = np.int32(row) * np.int32(3) * np.int32(place.columns)
+    green, blue = np.int32(place.columns), np.int32(2 * place.columns)
+    r, g, b = record[RED], record[GREEN], record[BLUE]
+    for i in range(n):
+        k = np.int32(ints[ADDRESS + i] - begin)
+        lists[KR + i] = r if k < green else (g if k < blue else b)
+    specular, shininess, lights = place.materials[material, 2], place.materials[material, 3], place.lights
+    if specular == ZERO or not place.own_eye:
+        return
+    d = record[DEPTH]
+    centre = (record[A] * d, record[B] * d, d)
+    normal = (record[NX], record[NY], record[ND])
+    for q in range(lights.shape[0]):
+        light, faces = light_at(q, record, place.lens_offset, lights)
+        if not faces:
+            continue
+        r, g, b = specular * lights[q, 4], specular * lights[q, 5], specular * lights[q, 6]
+        for i in range(n):
+            shine = shine_of(lists[LANE_OFFSET + i], centre, normal, light, shininess)
+            k = np.int32(ints[ADDRESS + i] - begin)
+            lists[KR + i] += shine * (r if k < green else (g if k < blue else b))
+
+
+@inlined
+def keep_nearest(n, lists, ints, planes):
+    """Keep the nearest depth of the listed samples."""
+    for i in range(n):
+        a = np.uint64(ints[ADDRESS + i])
+        depth, nearest = lists[LANE_Z + i], planes[NEAREST + a]
+        planes[NEAREST + a] = depth if depth < nearest else nearest
+
+
+@inlined
+def add_weights(n, number, reach, lists, ints, planes):
+    """Add weights and weighted colours to the listed samples where a surfel is seen.
+
+    Two lines may hold a sample that lies where the phase wraps: what a sample has of this surfel it gets once.
+    """
+    mark = np.int32(number).view(np.float32)
+    for i in range(n):
+        a = np.uint64(ints[ADDRESS + i])
+        depth, last = lists[LANE_Z + i], planes[LAST + a]
+        seen = (depth - reach <= planes[NEAREST + a]) & (depth < planes[STOP + a]) & (np.float32(last).view(np.int32) != number)
+        weight = lists[LANE_U + i] if seen else ZERO
+        planes[WEIGHT + a] += weight
+        planes[SUM + a] += weight * lists[KR + i]
+        planes[LAST + a] = mark if seen else last
+
+
+@inlined
+def draw_listed(n, place, blending, row, surfel, chord, scratch):
+    """Draw a chord at the listed samples."""
+    record, number, part, parts, material, lens = surfel
+    lists, ints, planes = scratch.lists, scratch.ints, scratch.planes
+    for i in range(16):  # whole SIMD steps
+        ints[ADDRESS + n + np.uint64(i)] = np.int32(row) * np.int32(3) * np.int32(place.columns)
+    whole = whole_steps(n)
+    place_samples(whole, row, place, lists, ints)
+    if blending:
+        list_weights(whole, chord, record[DEPTH], lists)
+    else:
+        list_depths(whole, chord, record[DEPTH], lists)
+    if parts & SMALL and parts & FRONT:
+        mask_small(whole, part == SMALL, record, lens, lists)
+    if blending:
+        list_colors(whole, row, place, record, material, lists, ints)
+        add_weights(n, number, record[REACH] * record[DEPTH], lists, ints, planes)
+    else:
+        keep_nearest(n, lists, ints, planes)
+
+
+@inlined
+def is_hidden(nearest, row, span, columns, planes):
+    """Whether all samples of pixels span[0] … span[1] of a row see something nearer."""
+    farthest = ZERO
+    for c in range(3):
+        begin = np.uint64((row * 3 + c) * columns)
+        for k in range((begin + np.uint64(span[0])) >> np.uint64(CELL), ((begin + np.uint64(span[1])) >> np.uint64(CELL)) + np.uint64(1)):
+            farthest = max(farthest, planes[FARTHEST + k])
+    return nearest > farthest
+
+
+@inlined
+def draw_chord(place, blending, row, surfel, chord, done, scratch):
+    """Draw one chord in every sub-pixel: its depths or, `blending`, its colours where it is seen. See draw_surfels."""
+    lists, ints, record = scratch.lists, scratch.ints, surfel[0]
+    plan = place.plan
+    low, high = np.float32(plan.low), np.float32(plan.high)
+    x1, p1, x2, p2 = chord[0], chord[1], chord[2], chord[3]
+    left = min(x1 + low * p1, x1 + high * p1) - np.float32(2.0)
+    right = max(x2 + low * p2, x2 + high * p2) + np.float32(1.0)
+    first, columns = np.float32(place.first), np.float32(place.columns)
+    if right < first or left > first + columns:
+        return 0
+    left, right = max(left - first, ZERO), min(right - first, columns - ONE)
+    if blending:
+        nearest = CLOSER * record[DEPTH] / max(chord[4], chord[5]) - record[REACH] * record[DEPTH]
+        if is_hidden(nearest, row, (np.int64(left), np.int64(right)), place.columns, scratch.planes):
+            return 0
+    starts = place.block.starts[row]
+    line = starts[np.int64(max(left - np.float32(plan.reach), ZERO)) >> BUCKET]
+    stop = starts[(np.int64(right) >> BUCKET) + 1]
+    n, period = np.uint64(0), np.int32(plan.period)
+    while line < stop:
+        count = np.uint64(min(stop - line, LINES_AT_ONCE))
+        most = find_intervals(np.uint64(line), count, row, (x1, p1, x2, p2), place, lists, ints)
+        for k in range(most):
+            if n > np.uint64(CAPACITY - LINES_AT_ONCE):
+                draw_listed(n, place, blending, row, surfel, chord, scratch)
+                n = np.uint64(0)
+            for i in range(count):
+                ints[ADDRESS + n] = ints[BASE + i] + np.int32(k) * period
+                n += np.uint64(lists[RUN + i] > np.float32(k))
+        line += np.int64(count)
+    if n > np.uint64(0):
+        draw_listed(n, place, blending, row, surfel, chord, scratch)
+    return 0
+
+
+@inlined
+def load_depths(line, base, columns, flip, count, depth, planes):
+    """Clear the sums of a row's samples, and take the depths of what is drawn already from `line` of depth."""
+    width = depth.shape[1]
+    for c in range(3):
+        begin = np.uint64(base + c * count)
+        for x in range(columns[1] - columns[0]):
+            column = width - 1 - columns[0] - x if flip else columns[0] + x
+            at = depth[line, column, c]
+            a = begin + np.uint64(x)
+            planes[NEAREST + a], planes[STOP + a] = at, at
+            planes[WEIGHT + a], planes[SUM + a], planes[LAST + a] = ZERO, ZERO, NOBODY
+
+
+@inlined
+def store_samples(line, base, columns, flip, count, planes, color, depth):
+    """Write values and depths of a row's samples that see surfels."""
+    width = depth.shape[1]
+    for c in range(3):
+        begin = np.uint64(base + c * count)
+        for x in range(columns[1] - columns[0]):
+            a = begin + np.uint64(x)
+            weight = planes[WEIGHT + a]
+            if weight > ZERO:
+                column = width - 1 - columns[0] - x if flip else columns[0] + x
+                color[line, column, c] = np.uint8(quantize(planes[SUM + a] * (ONE / weight)))
+                depth[line, column, c] = planes[NEAREST + a]
+
+
+@inlined
+def find_farthest(samples, planes):
+    """The farthest depth of every few samples."""
+    for k in range(np.uint64(samples) >> np.uint64(CELL)):
+        farthest = planes[NEAREST + (k << np.uint64(CELL))]
+        for i in range(np.uint64(1), np.uint64(1 << CELL)):
+            farthest = max(farthest, planes[NEAREST + (k << np.uint64(CELL)) + i])
+        planes[FARTHEST + k] = farthest
+
+
+@kernel
+def splat_panel(span, grid, splats, camera, panel, block, scratch, color, depth):
+    """Draw the surfels of blocks span[0] … span[1] over color (H, W, 3) uint8 and depth (H, W, 3) float32."""
+    height, width, _ = depth.shape
+    plan, flip, plane = panel.plan, panel.flip_x, grid.columns
+    half, third = np.float32(0.5), np.float32(1.0 / 3.0)
+    at = (half, half, half, half, half, ZERO)
+    if panel.subpixel:
+        at = (np.float32(1.0 / 6.0), half, np.float32(5.0 / 6.0), ZERO, half, third)
+    lens_offset = np.float32(camera.offset_y)
+    for k in range(span[0], span[1]):
+        start, end = splats.bin_start[k], splats.bin_start[k + 1]
+        if start == end:
+            continue
+        first_row, first = k // grid.blocks * grid.rows, k % grid.blocks * grid.columns
+        rows, columns = (first_row, min(first_row + grid.rows, height)), (first, min(first + plane, width))
+        for r in range(rows[0], rows[1]):
+            i, line = r - rows[0], height - 1 - r if panel.flip_y else r
+            base = i * 3 * plane
+            row_offsets(line, width, flip, columns, base, first, plane, plan, block.u, block.offsets)
+            starts, lines, addresses = block.starts[i], block.lines[i], block.addresses[i]
+            found = (block.found, block.found_ints)
+            make_lines(line, width, flip, columns, base, first, plane, plan, starts, lines, addresses, *found)
+            load_depths(line, base, columns, flip, plane, depth, scratch.planes)
+        materials, lights, own_eye = splats.materials, splats.lights, splats.own_eye
+        place = Place(block, plan, first, plane, at, lens_offset, materials, lights, own_eye)
+        bounds = (rows[0], rows[1], start, end)
+        draw_surfels(draw_chord, place, False, bounds, splats, camera, scratch)
+        find_farthest((rows[1] - rows[0]) * 3 * plane, scratch.planes)
+        draw_surfels(draw_chord, place, True, bounds, splats, camera, scratch)
+        for r in range(rows[0], rows[1]):
+            line = height - 1 - r if panel.flip_y else r
+            store_samples(line, (r - rows[0]) * 3 * plane, columns, flip, plane, scratch.planes, color, depth)
