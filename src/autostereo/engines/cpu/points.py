@@ -116,7 +116,7 @@ def draw_points_panel(
 def panel_grid(width: int, height: int) -> Grid:
     """Blocks for which the samples of a panel stay in cache."""
     blocks = -(-width // PANEL_COLUMNS)
-    columns = (-(-width // blocks) + 15) // 16 * 16
+    columns = (-(-width // blocks) + 31) // 32 * 32
     return Grid(min(max(1, PANEL_SAMPLES // (3 * columns)), height), columns, blocks)
 
 

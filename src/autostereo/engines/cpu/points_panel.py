@@ -29,14 +29,14 @@ from .mesh_shade import (
     whole_steps,
 )
 from .panel_lines import BUCKET, LinePlan, make_lines, row_offsets
-from .points_block import CLOSER, draw_surfels
+from .points_block import BEFORE, BEHIND, BLEND, draw_surfels, middle_depth, swath
 from .points_chord import depth_of, is_small, light_at, shine_of, weight_of
 from .points_setup import A, B, BLUE, DEPTH, FRONT, GREEN, ND, NX, NY, REACH, RED, SMALL
 
 PLANE = np.uint64(12288 + 5 * 16)  # samples of a block; planes must not fall onto the same cache sets
 NEAREST, STOP, WEIGHT, SUM, LAST, FARTHEST = (PLANE * np.uint64(k) for k in range(6))
 PLANES = 6
-CELL = 4  # there is a farthest depth for every 2⁴ samples of a channel
+CELL = 5  # there is a farthest depth for every 2⁵ pixels
 FAR = np.float32(np.inf)
 NOBODY = np.int32(-1).view(np.float32)
 
@@ -166,14 +166,20 @@ def draw_listed(n, place, blending, row, surfel, chord, scratch):
 
 
 @inlined
-def is_hidden(nearest, row, span, columns, planes):
-    """Whether all samples of pixels span[0] … span[1] of a row see something nearer."""
-    farthest = ZERO
-    for c in range(3):
-        begin = np.uint64((row * 3 + c) * columns)
-        for k in range((begin + np.uint64(span[0])) >> np.uint64(CELL), ((begin + np.uint64(span[1])) >> np.uint64(CELL)) + np.uint64(1)):
-            farthest = max(farthest, planes[FARTHEST + k])
-    return nearest > farthest
+def is_hidden(place, nearest, record, lens, rows, scratch):
+    """Whether all that a surfel may touch sees something nearer."""
+    low, high = np.float32(place.plan.low), np.float32(place.plan.high)
+    left, right = swath(record, lens, low, high)
+    first, columns, planes = np.float32(place.first), np.float32(place.columns), scratch.planes
+    left, right = max(left - first, ZERO), min(right - first, columns - ONE)
+    if left > right:
+        return True
+    for row in range(rows[0], rows[1]):
+        begin = FARTHEST + np.uint64(row * (place.columns >> CELL))
+        for c in range(np.uint64(np.int64(left) >> CELL), np.uint64(np.int64(right) >> CELL) + np.uint64(1)):
+            if nearest <= planes[begin + c]:
+                return False
+    return True
 
 
 @inlined
@@ -189,10 +195,6 @@ def draw_chord(place, blending, row, surfel, chord, done, scratch):
     if right < first or left > first + columns:
         return 0
     left, right = max(left - first, ZERO), min(right - first, columns - ONE)
-    if blending:
-        nearest = CLOSER * record[DEPTH] / max(chord[4], chord[5]) - record[REACH] * record[DEPTH]
-        if is_hidden(nearest, row, (np.int64(left), np.int64(right)), place.columns, scratch.planes):
-            return 0
     starts = place.block.starts[row]
     line = starts[np.int64(max(left - np.float32(plan.reach), ZERO)) >> BUCKET]
     stop = starts[(np.int64(right) >> BUCKET) + 1]
@@ -243,13 +245,16 @@ def store_samples(line, base, columns, flip, count, planes, color, depth):
 
 
 @inlined
-def find_farthest(samples, planes):
-    """The farthest depth of every few samples."""
-    for k in range(np.uint64(samples) >> np.uint64(CELL)):
-        farthest = planes[NEAREST + (k << np.uint64(CELL))]
-        for i in range(np.uint64(1), np.uint64(1 << CELL)):
-            farthest = max(farthest, planes[NEAREST + (k << np.uint64(CELL)) + i])
-        planes[FARTHEST + k] = farthest
+def find_farthest(rows, columns, planes):
+    """The farthest depth of every few pixels of a row."""
+    for row in range(rows):
+        for c in range(columns >> CELL):
+            farthest = ZERO
+            for channel in range(3):
+                begin = NEAREST + np.uint64((row * 3 + channel) * columns + (c << CELL))
+                for k in range(np.uint64(1 << CELL)):
+                    farthest = max(farthest, planes[begin + k])
+            planes[FARTHEST + np.uint64(row * (columns >> CELL) + c)] = farthest
 
 
 @kernel
@@ -278,10 +283,12 @@ def splat_panel(span, grid, splats, camera, panel, block, scratch, color, depth)
             load_depths(line, base, columns, flip, plane, depth, scratch.planes)
         materials, lights, own_eye = splats.materials, splats.lights, splats.own_eye
         place = Place(block, plan, first, plane, at, lens_offset, materials, lights, own_eye)
-        bounds = (rows[0], rows[1], start, end)
-        draw_surfels(draw_chord, place, False, bounds, splats, camera, scratch)
-        find_farthest((rows[1] - rows[0]) * 3 * plane, scratch.planes)
-        draw_surfels(draw_chord, place, True, bounds, splats, camera, scratch)
+        bounds = (rows[0], rows[1], start, end, middle_depth(start, end, splats))
+        draw_surfels(draw_chord, is_hidden, place, BEFORE, bounds, splats, camera, scratch)
+        find_farthest(rows[1] - rows[0], plane, scratch.planes)
+        draw_surfels(draw_chord, is_hidden, place, BEHIND, bounds, splats, camera, scratch)
+        find_farthest(rows[1] - rows[0], plane, scratch.planes)
+        draw_surfels(draw_chord, is_hidden, place, BLEND, bounds, splats, camera, scratch)
         for r in range(rows[0], rows[1]):
             line = height - 1 - r if panel.flip_y else r
             store_samples(line, (r - rows[0]) * 3 * plane, columns, flip, plane, scratch.planes, color, depth)

@@ -14,19 +14,20 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_shade import ALPHA, ONE, STRIDE, ZERO, quantize, whole_steps
-from .points_block import CLOSER, draw_surfels
+from .mesh_shade import ALPHA, HALF, ONE, STRIDE, ZERO, quantize, whole_steps
+from .points_block import BEFORE, BEHIND, BLEND, CLOSER, TWO, draw_surfels, middle_depth, swath
 from .points_chord import depth_of, is_small, light_at, shine_of, weight_of
 from .points_setup import A, B, BLUE, DEPTH, FRONT, GREEN, ND, NX, NY, REACH, RED, SMALL
 
 VIEWS_AT_ONCE = 256
-HALF, TWO = np.float32(0.5), np.float32(2.0)
 SMALL_MADE, COLORS_MADE = 1, 2
 PLANE = np.uint64(16384 + 5 * 16)  # samples of a block; planes must not fall onto the same cache sets
 NEAREST, STOP, WEIGHT, SUM_R, SUM_G, SUM_B, FARTHEST = (PLANE * np.uint64(k) for k in range(7))
 PLANES = 7
 CELL = 2  # there is a farthest depth for every 2² samples: of them …
 CELL_REACH = 12  # … and of those after them
+COARSE = FARTHEST + PLANE // np.uint64(2)  # and one for every 2³ samples of 2³ views
+GROUP = 3
 PAD = 16  # samples beyond a row's end that whole steps may touch
 
 # rows of the float32 scratch, one value per view
@@ -139,13 +140,44 @@ def draw_nearest(views, chord, lists, ints, planes):
 
 
 @inlined
-def find_farthest(samples, planes):
-    """The farthest depth of every few samples."""
-    for c in range(np.uint64(samples >> CELL)):
+def find_farthest(rows, views, stride, planes):
+    """The farthest depth of every few samples of a view, and of a few views."""
+    for c in range(np.uint64((rows * np.int64(views) * stride) >> CELL)):
         farthest = planes[NEAREST + (c << np.uint64(CELL))]
         for k in range(1, CELL_REACH):
             farthest = max(farthest, planes[NEAREST + (c << np.uint64(CELL)) + np.uint64(k)])
         planes[FARTHEST + c] = farthest
+    cells, to = np.uint64(stride >> GROUP), COARSE
+    for row in range(rows):
+        for first in range(0, np.int64(views), 1 << GROUP):
+            for c in range(cells):
+                farthest = ZERO
+                for v in range(first, min(first + (1 << GROUP), np.int64(views))):
+                    begin = np.uint64(((row * np.int64(views) + v) * stride) >> CELL)
+                    farthest = max(farthest, planes[FARTHEST + begin + (c << np.uint64(GROUP - CELL))])
+                planes[to + c] = farthest
+            to += cells
+
+
+@inlined
+def is_hidden(place, nearest, record, lens, rows, scratch):
+    """Whether all that a surfel may touch sees something nearer, in every view."""
+    planes, views = scratch.planes, np.int64(place.views)
+    groups, cells = (views + (1 << GROUP) - 1) >> GROUP, np.int64(place.stride) >> GROUP
+    for g in range(groups):
+        first = place.first_view + np.uint64(g << GROUP)
+        last = place.first_view + np.uint64(min((g + 1) << GROUP, views) - 1)
+        left, right = swath(record, lens, place.offsets[first], place.offsets[last])
+        left, right = max(left - place.first, ZERO), min(right, place.end) - place.first
+        if left > right:
+            continue
+        cell0, cell1 = np.int64(left) >> GROUP, np.int64(right) >> GROUP
+        for row in range(rows[0], rows[1]):
+            begin = COARSE + np.uint64((row * groups + g) * cells)
+            for c in range(np.uint64(cell0), np.uint64(cell1) + np.uint64(1)):
+                if nearest <= planes[begin + c]:
+                    return False
+    return True
 
 
 @inlined
@@ -263,7 +295,7 @@ def splat_views(span, grid, splats, camera, offsets, scratch, color, depth):
     """
     views, height, width = depth.shape
     colors, depths = color.reshape(-1), depth.reshape(-1)
-    stride = grid.columns + PAD
+    stride = (grid.columns + PAD + 7) & ~7
     for k in range(span[0], span[1]):
         start, end = splats.bin_start[k], splats.bin_start[k + 1]
         if start == end:
@@ -271,14 +303,16 @@ def splat_views(span, grid, splats, camera, offsets, scratch, color, depth):
         first_row, first_column = k // grid.blocks * grid.rows, k % grid.blocks * grid.columns
         rows = (first_row, min(first_row + grid.rows, height))
         columns = (first_column, min(first_column + grid.columns, width))
-        bounds = (rows[0], rows[1], start, end)
+        bounds = (rows[0], rows[1], start, end, middle_depth(start, end, splats))
         for first in range(0, views, VIEWS_AT_ONCE):
             view, count = np.uint64(first), np.uint64(min(VIEWS_AT_ONCE, views - first))
             low, high, lens_offset = np.float32(columns[0]), np.float32(columns[1]), np.float32(camera.offset_y)
             materials, lights, own_eye = splats.materials, splats.lights, splats.own_eye
             place = Place(offsets, view, count, low, high, np.int32(stride), lens_offset, materials, lights, own_eye)
             load_depths(rows, columns, count, stride, (height, width), view, depths, scratch.planes)
-            draw_surfels(draw_chord, place, False, bounds, splats, camera, scratch)
-            find_farthest((rows[1] - rows[0]) * np.int64(count) * stride, scratch.planes)
-            draw_surfels(draw_chord, place, True, bounds, splats, camera, scratch)
+            draw_surfels(draw_chord, is_hidden, place, BEFORE, bounds, splats, camera, scratch)
+            find_farthest(rows[1] - rows[0], count, stride, scratch.planes)
+            draw_surfels(draw_chord, is_hidden, place, BEHIND, bounds, splats, camera, scratch)
+            find_farthest(rows[1] - rows[0], count, stride, scratch.planes)
+            draw_surfels(draw_chord, is_hidden, place, BLEND, bounds, splats, camera, scratch)
             store_samples(rows, columns, count, stride, (height, width), view, scratch.planes, colors, depths)

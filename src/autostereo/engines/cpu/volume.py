@@ -37,7 +37,7 @@ from .volume_modes import LEVELS
 from .volume_views import COMPOSITE, ISO, MIP, VIEWS_AT_ONCE, Ways, draw_rows, draw_shared_rows
 
 MODES = ("composite", "mip", "iso")  # in the order of volume_views
-FINE = (0.25, 0.5)
+FINE = (1 / 3, 1 / 2)
 MAX_PERIOD = 16  # pixels of a table's period, up to which its lines are drawn like views
 FINE_VIEWS = 2  # positions of a shared slab per pixel
 MAX_PLANES = 2**20
@@ -81,7 +81,7 @@ def make_cut(
     volume = f.volume
     index_from_eye = np.linalg.inv(camera.eye_from_world @ volume.world_from_index)
     along = float(np.abs(index_from_eye[:3, 0]).max())  # voxels per unit of X
-    step = float(np.clip(slices.first / camera.fx, FINE[0] / along, FINE[1] / along))
+    step = float(np.clip(1.4 * slices.first / camera.fx, FINE[0] / along, FINE[1] / along))
     x = (camera.eye_from_world @ np.column_stack([volume.corners, np.ones(8)]).T)[0]
     first = float(x.min()) - 2.0 * step
     reach = int(np.ceil((8 * step * along + 1 + slices.distance * np.abs(index_from_eye[:3, 2]).max()) / (1 << BLOCK)))
@@ -145,6 +145,7 @@ def new_planes(samples: int, slices: Slices, channels: int) -> Planes:
         np.zeros((SLABS + 1, 1 + channels, samples + 1), np.float32),
         np.zeros((slices.slabs + 1, runs), np.uint8),
         np.zeros((slices.slabs + 1, runs), np.uint8),
+        np.zeros(runs, np.uint8),
         np.zeros(LIST, np.int64),
         np.zeros(8 * LIST, np.int32),
         np.zeros(LIST_ROWS * LIST, np.float32),

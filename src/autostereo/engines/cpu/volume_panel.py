@@ -11,10 +11,10 @@ import numpy as np
 
 from .jit import inlined, kernel
 from .panel_lines import row_offsets
-from .volume_rays import B, BLOCK_ROWS, END, G, HALF, LENGTH, ONE, ORIGIN, R, RAYS, ROW, T, TURN, ZERO
-from .volume_sample import SLABS, mark_runs
+from .volume_rays import B, BLOCK_ROWS, END, G, HALF, LENGTH, ONE, OPAQUE, ORIGIN, R, RAYS, ROW, T, TURN, ZERO
+from .volume_sample import SLABS, hide_runs, keep_alive, mark_runs
 from .volume_shared import ALPHA, LINE, RED, SLAB_ROWS, classify_slabs, next_run, shift_of
-from .volume_views import clear_rays, march_volumes, mark_volumes, next_slices, over, resolve_rays
+from .volume_views import MIP, clear_rays, hide_behind_rays, march_volumes, mark_volumes, next_slices, over, resolve_rays
 
 AT, MOVE, SHARE_R, CUT_R, A0, A1, C0, C1, SUM, THROUGH = (np.uint64(k * ROW) for k in range(10))
 PIXEL_ROWS = 10
@@ -139,6 +139,37 @@ def place_in_pixel(subpixel, c):
 
 
 @kernel
+def hide_behind_panel(width, period, offsets, camera, cut, slices, k, last, planes, line, pixels):
+    """Leave out what all sub-pixels have seen enough before, in the slices of slabs k … last."""
+    near, far = slices.first + k * slices.distance, slices.first + last * slices.distance
+    planes.alive[:] = np.uint8(0)
+    for c in range(3):
+        for x in range(0, width, RAYS):
+            low, high, dark = np.float32(np.inf), np.float32(-np.inf), True
+            for i in range(x, min(x + RAYS, width)):
+                if period > 0:
+                    through = line[np.uint64(((i % period) * 3 + c) * SLAB_ROWS * LINE + i // period) + ALPHA]
+                else:
+                    through = pixels[np.uint64((3 * (i // RAYS) + c) * PIXEL_ROWS * ROW + i % RAYS) + THROUGH]
+                if through >= OPAQUE:
+                    o = offsets[c * width + i]
+                    low, high, dark = min(low, o), max(high, o), False
+            if not dark:
+                keep_between(x, low, high, near, far, camera, cut, planes.alive)
+    hide_runs(k, last, planes)
+
+
+@inlined
+def keep_between(x, low, high, near, far, camera, cut, alive):
+    """Note that pixels x … x + 64 are not yet opaque for any offset between two: the offset enters linearly."""
+    left, right = (x - 1 - camera.centre_x) / camera.fx, (x + RAYS + 1 - camera.centre_x) / camera.fx
+    near_part, far_part = 1.0 - near / camera.focal, 1.0 - far / camera.focal
+    a, b = min(low * near_part, high * near_part), max(low * near_part, high * near_part)
+    c, d = min(low * far_part, high * far_part), max(low * far_part, high * far_part)
+    keep_alive(min(a + near * left, c + far * left), max(b + near * right, d + far * right), cut, alive)
+
+
+@kernel
 def draw_panel_rows(rows, cut, camera, slices, ways, panel, period, averaged, planes, shared, scratch, color):
     """Draw rows (first, end) of the picture from shared slabs over the panel color (H, W, 3).
 
@@ -173,6 +204,8 @@ def draw_panel_rows(rows, cut, camera, slices, ways, panel, period, averaged, pl
                     pixels[base + THROUGH + k] = ONE
         for k in range(0, slices.slabs, SLABS):
             last = min(k + SLABS, slices.slabs)
+            if k > 0:
+                hide_behind_panel(width, period, offsets, camera, cut, slices, k, last, planes, line, pixels)
             next_slices(cut, 0.0, row, slices, k, last, SLABS, planes)
             args = (ways.table, ways.material, ways.light, planes, shared, rays, index)
             classify_slabs(cut, camera, row, slices, k, last, *args)
@@ -244,6 +277,8 @@ def draw_panel_rays(rows, cuts, camera, slices, ways, panel, wants_depth, planes
                     rays[base + END + k] = min(np.float32(far), depth[shown, column, c])
         for k in range(0, slices.slabs, chunk):
             last = min(k + chunk, slices.slabs)
+            if k > 0 and len(cuts) == 1 and ways[0].mode != MIP:
+                hide_behind_rays(blocks, cuts[0], slices, k, last, ways[0].mode, planes[0], rays)
             for v in range(len(cuts)):
                 next_slices(cuts[v], 0.0, row, slices, k, last, chunk, planes[v])
             march_volumes(blocks, cuts, row, slices, k, last, ways, wants_depth, planes, rays, index)

@@ -13,8 +13,8 @@ from .jit import inlined, kernel
 from .mesh_shade import exp2_fast
 from .volume_sample import SLABS, any_marked
 
-RAYS = 64  # of a block
-ROW = 80  # distance of a block's rows
+RAYS = 128  # of a block
+ROW = 144  # distance of a block's rows
 (
     ORIGIN, TURN, ENTER, LEAVE, LENGTH, T, R, G, B, HALF, FRONT, BACK, OPTICAL, SHARE,
     PART, LEFT, RIGHT, END, FRONT_LIGHT, BACK_LIGHT,

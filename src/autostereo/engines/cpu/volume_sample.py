@@ -74,6 +74,7 @@ class Planes(NamedTuple):
     values: np.ndarray
     marks: np.ndarray
     wanted: np.ndarray
+    alive: np.ndarray
     place: np.ndarray
     words: np.ndarray
     lists: np.ndarray
@@ -234,7 +235,7 @@ def light_samples(n, cut, eye, x, y, depth, lists):
             lists[first + i] = lists[first + i] if a * a + b * b + c * c > np.float32(0.5) else neutral
 
 
-@kernel
+@inlined
 def sample_run(n, cut, eye, x, y, depth, start, place, words, lists):
     """Scalars, as rows of the table, and light of n ≤ 256 samples from X = x on, into lists."""
     m = cut.index
@@ -297,3 +298,22 @@ def any_marked(marks, k, first, last):
     for c in range(max(first, 0) >> CHUNK, min(last >> CHUNK, marks.shape[1] - 1) + 1):
         found |= marks[k, c]
     return found != 0
+
+
+@inlined
+def keep_alive(low, high, cut, alive):
+    """Note that something between X = low and high is not yet hidden."""
+    runs, inverse = np.float64(alive.shape[0] << CHUNK), 1.0 / cut.step
+    first = np.int64(min(max((low - cut.first) * inverse, 0.0), runs)) >> CHUNK
+    last = np.int64(min(max((high - cut.first) * inverse, -16.0), runs)) >> CHUNK
+    for c in range(max(first - 1, 0), min(last + 2, alive.shape[0])):
+        alive[c] = np.uint8(1)
+
+
+@kernel
+def hide_runs(first, last, planes):
+    """Leave out runs of slices first … last that are hidden: those that are not alive."""
+    for k in range(first, last + 1):
+        for c in range(planes.alive.shape[0]):
+            planes.marks[k, c] &= planes.alive[c]
+            planes.wanted[k, c] &= planes.alive[c]

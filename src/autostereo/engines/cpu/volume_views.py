@@ -9,9 +9,10 @@ import numpy as np
 from .jit import inlined, kernel
 from .volume_modes import NONE, march_iso, march_mip, resolve_iso, resolve_mip
 from .volume_rays import (
-    B, BLOCK_ROWS, END, G, HALF, HALF_WAY, LENGTH, ONE, ORIGIN, R, RAYS, ROW, T, TURN, ZERO, march, ray_stretch,
+    B, BLOCK_ROWS, END, G, HALF, HALF_WAY, LENGTH, ONE, OPAQUE, ORIGIN, R, RAYS, ROW, T, TURN, ZERO,
+    block_bounds, march, ray_stretch,
 )  # fmt: skip
-from .volume_sample import SLABS, mark_runs, sample_slice
+from .volume_sample import SLABS, hide_runs, keep_alive, mark_runs, sample_slice
 from .volume_shared import ALPHA, BLUE, GREEN, LINE, RED, SLAB_ROWS, blend_view, classify_slabs, clear_line, even_out
 
 COMPOSITE, MIP, ISO = 0, 1, 2
@@ -65,6 +66,24 @@ def march_volumes(blocks, cuts, row, slices, k, last, ways, wants_half, planes, 
             else:
                 args = (way.table, way.material, way.light, wants_half)
                 march(n, base, cut, slices, k, last, *args, planes[v], rays, packed)
+
+
+@kernel
+def hide_behind_rays(blocks, cut, slices, k, last, mode, planes, rays):
+    """Leave out what all rays have seen enough before, in the slices of slabs k … last."""
+    n, near, far = np.uint64(RAYS), slices.first + k * slices.distance, slices.first + last * slices.distance
+    planes.alive[:] = np.uint8(0)
+    for b in range(blocks):
+        base = np.uint64(b * BLOCK_ROWS * ROW)
+        most = ZERO
+        for i in range(n):
+            through = rays[base + T + i] if mode == COMPOSITE else (ONE if rays[base + HALF + i] > far else ZERO)
+            most = max(most, through)
+        if most >= OPAQUE:
+            low, high, least, steepest = block_bounds(n, base, rays)
+            left, right = low + min(near * least, far * least), high + max(near * steepest, far * steepest)
+            keep_alive(left, right, cut, planes.alive)
+    hide_runs(k, last, planes)
 
 
 @kernel
@@ -161,6 +180,9 @@ def draw_rows(rows, cuts, camera, slices, ways, offsets, together, wants_depth, 
                             rays[base + END + i] = min(np.float32(far), depth[v, r, x + i])
             for k in range(0, slices.slabs, chunk):
                 last = min(k + chunk, slices.slabs)
+                if k > 0 and len(cuts) == 1 and ways[0].mode != MIP:
+                    args = (slices, k, last, ways[0].mode, planes[0], rays)
+                    hide_behind_rays((v1 - v0) * blocks, cuts[0], *args)
                 for v in range(len(cuts)):
                     next_slices(cuts[v], eye, row, slices, k, last, chunk, planes[v])
                 march_volumes((v1 - v0) * blocks, cuts, row, slices, k, last, ways, wants_depth, planes, rays, packed)
@@ -188,6 +210,30 @@ def finish_line(width, t, line, color):
         color[i, 3] = over(ONE - through, through, color[i, 3])
 
 
+@inlined
+def keep_group(x, pixels, offset, near, far, camera, cut, alive):
+    """Note that `pixels` pixels from x on of a view are not yet opaque, between two depths."""
+    left = (x - camera.centre_x) / camera.fx - offset / camera.focal
+    right = left + (pixels + 1) / camera.fx
+    keep_alive(offset + min(near * left, far * left), offset + max(near * right, far * right), cut, alive)
+
+
+@kernel
+def hide_behind_views(views, width, offsets, camera, cut, slices, k, last, planes, line):
+    """Leave out what all views have seen enough before, in the slices of slabs k … last."""
+    near, far = slices.first + k * slices.distance, slices.first + last * slices.distance
+    planes.alive[:] = np.uint8(0)
+    for v in range(views):
+        t = np.uint64(v * SLAB_ROWS * LINE) + ALPHA
+        for x in range(0, width, RAYS):
+            pixels, dark = min(RAYS, width - x), True
+            for i in range(x, x + pixels):
+                dark = dark and line[t + np.uint64(i)] < OPAQUE
+            if not dark:
+                keep_group(x, pixels, offsets[v], near, far, camera, cut, planes.alive)
+    hide_runs(k, last, planes)
+
+
 @kernel
 def draw_shared_rows(rows, cut, camera, slices, ways, offsets, planes, shared, rays, packed, line, color):
     """Draw rows (first, end) of every view from slabs that they share, over color (V, H, W, 4)."""
@@ -201,6 +247,8 @@ def draw_shared_rows(rows, cut, camera, slices, ways, offsets, planes, shared, r
             clear_line(np.uint64(width), np.uint64(v * SLAB_ROWS * LINE), line)
         for k in range(0, slices.slabs, SLABS):
             last = min(k + SLABS, slices.slabs)
+            if k > 0:
+                hide_behind_views(views, width, offsets, camera, cut, slices, k, last, planes, line)
             next_slices(cut, 0.0, row, slices, k, last, SLABS, planes)
             args = (ways.table, ways.material, ways.light, planes, shared, rays, packed)
             classify_slabs(cut, camera, row, slices, k, last, *args)
