@@ -17,6 +17,7 @@ from ..engine import Draw, Target
 from . import gather
 from .memory import Memory
 from .mesh import PreparedMeshes, draw_mesh_panel, draw_mesh_views, prepare_meshes
+from .points import PointArrays, draw_points_panel, draw_points_views, prepare_points
 from .scene_arrays import background_word
 from .volume import PreparedVolumes, draw_volume_panel, draw_volume_views, prepare_volumes
 
@@ -27,6 +28,7 @@ class Prepared:
 
     scene: Scene
     meshes: PreparedMeshes | None
+    points: PointArrays | None
     volumes: PreparedVolumes | None
     memory: Memory = field(default_factory=Memory)
     lock: threading.Lock = field(default_factory=threading.Lock)
@@ -38,10 +40,10 @@ class Prepared:
 
 
 class CpuEngine:
-    """Draws meshes and volumes; see engines.engine.Engine.
+    """Draws meshes, points and volumes; see engines.engine.Engine.
 
-    Meshes alone are drawn into finished pictures. Everything else is drawn stage by stage over pictures and
-    depths: meshes, then volumes, whose rays end at the depth of what is opaque.
+    Meshes alone are drawn into finished pictures. Everything else is drawn stage by stage over pictures and depths:
+    meshes, isosurfaces, points, then volumes, whose rays end at the depth of what is opaque.
     """
 
     name = "cpu"
@@ -50,17 +52,19 @@ class CpuEngine:
     def prepare(self, scene: Scene) -> Prepared:
         """Turn every kind of primitive into arrays."""
         meshes = [item for item in scene.objects if isinstance(item, Mesh)]
+        points = [item for item in scene.objects if isinstance(item, Points)]
         volumes = [item for item in scene.objects if isinstance(item, Volume)]
         return Prepared(
             scene,
             prepare_meshes(scene, meshes) if meshes else None,
+            prepare_points(points) if points else None,
             prepare_volumes(scene, volumes) if volumes else None,
         )
 
     def draw(self, prepared: Prepared, draw: Draw, target: Target) -> None:
         """Draw a stack of views, or straight to the panel."""
         with prepared.lock:
-            if prepared.volumes is None and prepared.meshes is not None:
+            if prepared.meshes is not None and prepared.points is None and prepared.volumes is None:
                 one = draw_mesh_views if draw.viewmap is None else draw_mesh_panel
                 one(prepared.meshes, draw, target, prepared.memory)
             elif draw.options.samples == 1:
@@ -88,7 +92,11 @@ class CpuEngine:
     def _draw_stages(self, prepared: Prepared, draw: Draw, target: Target) -> None:
         panel = draw.viewmap is not None
         shape = target.color.shape if panel else target.color.shape[:3]
-        several = prepared.meshes is not None or any(v.mode == "iso" for v in prepared.all_volumes)
+        several = (
+            prepared.meshes is not None
+            or prepared.points is not None
+            or any(v.mode == "iso" for v in prepared.all_volumes)
+        )
         depth = target.depth
         if depth is None and several:
             depth = prepared.memory.buffer("depth", shape, np.float32)
@@ -102,11 +110,15 @@ class CpuEngine:
             target.color[...] = background[: target.color.shape[-1]]
             if depth is not None:
                 depth[...] = np.inf
+        draw_volumes = draw_volume_panel if panel else draw_volume_views
+        ends = np.empty((0, 0, 0), np.float32) if depth is None else depth
         if prepared.volumes is not None:
-            ends = np.empty((0, 0, 0), np.float32) if depth is None else depth
-            draw_volumes = draw_volume_panel if panel else draw_volume_views
-            for opaque in (True, False):
-                draw_volumes(prepared.volumes, opaque, draw, target.color, ends, prepared.memory)
+            draw_volumes(prepared.volumes, True, draw, target.color, ends, prepared.memory)
+        if prepared.points is not None:
+            draw_points = draw_points_panel if panel else draw_points_views
+            draw_points(prepared.points, prepared.scene, draw, target.color, ends, prepared.memory)
+        if prepared.volumes is not None:
+            draw_volumes(prepared.volumes, False, draw, target.color, ends, prepared.memory)
 
     def interlace(self, views: NDArray[np.uint8], draw: Draw, out: NDArray[np.uint8]) -> None:
         """Gather a panel from its V views."""

@@ -37,8 +37,9 @@ from .volume_modes import LEVELS
 from .volume_views import COMPOSITE, ISO, MIP, VIEWS_AT_ONCE, Ways, draw_rows, draw_shared_rows
 
 MODES = ("composite", "mip", "iso")  # in the order of volume_views
-FINE = (1 / 3, 1 / 2)
+FINE = (1 / 8, 1 / 2)  # of a voxel: least and greatest distance of samples on a slice
 MAX_PERIOD = 16  # pixels of a table's period, up to which its lines are drawn like views
+PER_PIXEL = 1.4  # distance of samples on a slice, in pixels of the nearest one
 FINE_VIEWS = 2  # positions of a shared slab per pixel
 MAX_PLANES = 2**20
 
@@ -81,7 +82,7 @@ def make_cut(
     volume = f.volume
     index_from_eye = np.linalg.inv(camera.eye_from_world @ volume.world_from_index)
     along = float(np.abs(index_from_eye[:3, 0]).max())  # voxels per unit of X
-    step = float(np.clip(1.4 * slices.first / camera.fx, FINE[0] / along, FINE[1] / along))
+    step = float(np.clip(PER_PIXEL * slices.first / camera.fx, FINE[0] / along, FINE[1] / along))
     x = (camera.eye_from_world @ np.column_stack([volume.corners, np.ones(8)]).T)[0]
     first = float(x.min()) - 2.0 * step
     reach = int(np.ceil((8 * step * along + 1 + slices.distance * np.abs(index_from_eye[:3, 2]).max()) / (1 << BLOCK)))
