@@ -23,7 +23,7 @@ from .points_panel import PLANE as PANEL_PLANE
 from .points_panel import PLANES as PANEL_PLANES
 from .points_panel import splat_panel
 from .points_setup import WORDS, Grid, View, fill_bins, place_surfels
-from .points_views import PAD, PLANE, PLANES, VIEWS_AT_ONCE, Scratch, splat_views
+from .points_views import PAD, PLANE, PLANES, VIEWS_AT_ONCE, Scratch, row_samples, splat_views
 from .scene_arrays import light_array
 from .threads import run_rows
 
@@ -67,7 +67,7 @@ def view_grid(views: int, width: int, height: int) -> Grid:
     columns = max(48, SAMPLES // views - PAD)
     blocks = -(-width // columns)
     columns = -(-width // blocks)
-    rows = int(np.clip(SAMPLES // (views * (columns + PAD)), 1, 16))
+    rows = int(np.clip(SAMPLES // (views * row_samples(columns)), 1, 16))
     return Grid(min(rows, height), columns, blocks)
 
 

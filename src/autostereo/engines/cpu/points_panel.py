@@ -29,9 +29,9 @@ from .mesh_shade import (
     whole_steps,
 )
 from .panel_lines import BUCKET, LinePlan, make_lines, row_offsets
-from .points_block import BEFORE, BEHIND, BLEND, draw_surfels, middle_depth, swath
+from .points_block import STAGES, draw_surfels, middle_depth, swath
 from .points_chord import depth_of, is_small, light_at, shine_of, weight_of
-from .points_setup import A, B, BLUE, DEPTH, FRONT, GREEN, ND, NX, NY, REACH, RED, SMALL
+from .points_setup import BLUE, DEPTH, FRONT, GREEN, ND, NX, NY, REACH, RED, SMALL, A, B
 
 PLANE = np.uint64(12288 + 5 * 16)  # samples of a block; planes must not fall onto the same cache sets
 NEAREST, STOP, WEIGHT, SUM, LAST, FARTHEST = (PLANE * np.uint64(k) for k in range(6))
@@ -136,7 +136,8 @@ def add_weights(n, number, reach, lists, ints, planes):
     for i in range(n):
         a = np.uint64(ints[ADDRESS + i])
         depth, last = lists[LANE_Z + i], planes[LAST + a]
-        seen = (depth - reach <= planes[NEAREST + a]) & (depth < planes[STOP + a]) & (np.float32(last).view(np.int32) != number)
+        seen = (depth - reach <= planes[NEAREST + a]) & (depth < planes[STOP + a])
+        seen &= np.float32(last).view(np.int32) != number
         weight = lists[LANE_U + i] if seen else ZERO
         planes[WEIGHT + a] += weight
         planes[SUM + a] += weight * lists[KR + i]
@@ -185,7 +186,7 @@ def is_hidden(place, nearest, record, lens, rows, scratch):
 @inlined
 def draw_chord(place, blending, row, surfel, chord, done, scratch):
     """Draw one chord in every sub-pixel: its depths or, `blending`, its colours where it is seen. See draw_surfels."""
-    lists, ints, record = scratch.lists, scratch.ints, surfel[0]
+    lists, ints = scratch.lists, scratch.ints
     plan = place.plan
     low, high = np.float32(plan.low), np.float32(plan.high)
     x1, p1, x2, p2 = chord[0], chord[1], chord[2], chord[3]
@@ -201,17 +202,15 @@ def draw_chord(place, blending, row, surfel, chord, done, scratch):
     n, period = np.uint64(0), np.int32(plan.period)
     while line < stop:
         count = np.uint64(min(stop - line, LINES_AT_ONCE))
-        most = find_intervals(np.uint64(line), count, row, (x1, p1, x2, p2), place, lists, ints)
+        most = max(find_intervals(np.uint64(line), count, row, (x1, p1, x2, p2), place, lists, ints), np.int32(1))
+        line += np.int64(count)
         for k in range(most):
-            if n > np.uint64(CAPACITY - LINES_AT_ONCE):
-                draw_listed(n, place, blending, row, surfel, chord, scratch)
-                n = np.uint64(0)
             for i in range(count):
                 ints[ADDRESS + n] = ints[BASE + i] + np.int32(k) * period
                 n += np.uint64(lists[RUN + i] > np.float32(k))
-        line += np.int64(count)
-    if n > np.uint64(0):
-        draw_listed(n, place, blending, row, surfel, chord, scratch)
+            if n > np.uint64(CAPACITY - LINES_AT_ONCE) or (line == stop and k + 1 == most and n > np.uint64(0)):
+                draw_listed(n, place, blending, row, surfel, chord, scratch)
+                n = np.uint64(0)
     return 0
 
 
@@ -284,11 +283,10 @@ def splat_panel(span, grid, splats, camera, panel, block, scratch, color, depth)
         materials, lights, own_eye = splats.materials, splats.lights, splats.own_eye
         place = Place(block, plan, first, plane, at, lens_offset, materials, lights, own_eye)
         bounds = (rows[0], rows[1], start, end, middle_depth(start, end, splats))
-        draw_surfels(draw_chord, is_hidden, place, BEFORE, bounds, splats, camera, scratch)
-        find_farthest(rows[1] - rows[0], plane, scratch.planes)
-        draw_surfels(draw_chord, is_hidden, place, BEHIND, bounds, splats, camera, scratch)
-        find_farthest(rows[1] - rows[0], plane, scratch.planes)
-        draw_surfels(draw_chord, is_hidden, place, BLEND, bounds, splats, camera, scratch)
+        for stage in range(STAGES):
+            if stage > 0:
+                find_farthest(rows[1] - rows[0], plane, scratch.planes)
+            draw_surfels(draw_chord, is_hidden, place, stage, bounds, splats, camera, scratch)
         for r in range(rows[0], rows[1]):
             line = height - 1 - r if panel.flip_y else r
             store_samples(line, (r - rows[0]) * 3 * plane, columns, flip, plane, scratch.planes, color, depth)

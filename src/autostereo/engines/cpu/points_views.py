@@ -15,9 +15,9 @@ import numpy as np
 
 from .jit import inlined, kernel
 from .mesh_shade import ALPHA, HALF, ONE, STRIDE, ZERO, quantize, whole_steps
-from .points_block import BEFORE, BEHIND, BLEND, CLOSER, TWO, draw_surfels, middle_depth, swath
+from .points_block import CLOSER, STAGES, TWO, draw_surfels, middle_depth, swath
 from .points_chord import depth_of, is_small, light_at, shine_of, weight_of
-from .points_setup import A, B, BLUE, DEPTH, FRONT, GREEN, ND, NX, NY, REACH, RED, SMALL
+from .points_setup import BLUE, DEPTH, FRONT, GREEN, ND, NX, NY, REACH, RED, SMALL, A, B
 
 VIEWS_AT_ONCE = 256
 SMALL_MADE, COLORS_MADE = 1, 2
@@ -34,6 +34,12 @@ PAD = 16  # samples beyond a row's end that whole steps may touch
 LEFT, RIGHT, ACROSS, FIRST, SMALL_HERE, CR, CG, CB = (np.uint64(k * STRIDE) for k in range(8))
 # rows of the int32 scratch
 BASE, COUNT = (np.uint64(k * STRIDE) for k in range(2))
+
+
+@kernel
+def row_samples(columns):
+    """Samples from view to view: those of a block's row, and as many more as whole steps may touch."""
+    return (columns + PAD + 7) & ~7
 
 
 class Scratch(NamedTuple):
@@ -295,7 +301,7 @@ def splat_views(span, grid, splats, camera, offsets, scratch, color, depth):
     """
     views, height, width = depth.shape
     colors, depths = color.reshape(-1), depth.reshape(-1)
-    stride = (grid.columns + PAD + 7) & ~7
+    stride = row_samples(grid.columns)
     for k in range(span[0], span[1]):
         start, end = splats.bin_start[k], splats.bin_start[k + 1]
         if start == end:
@@ -310,9 +316,8 @@ def splat_views(span, grid, splats, camera, offsets, scratch, color, depth):
             materials, lights, own_eye = splats.materials, splats.lights, splats.own_eye
             place = Place(offsets, view, count, low, high, np.int32(stride), lens_offset, materials, lights, own_eye)
             load_depths(rows, columns, count, stride, (height, width), view, depths, scratch.planes)
-            draw_surfels(draw_chord, is_hidden, place, BEFORE, bounds, splats, camera, scratch)
-            find_farthest(rows[1] - rows[0], count, stride, scratch.planes)
-            draw_surfels(draw_chord, is_hidden, place, BEHIND, bounds, splats, camera, scratch)
-            find_farthest(rows[1] - rows[0], count, stride, scratch.planes)
-            draw_surfels(draw_chord, is_hidden, place, BLEND, bounds, splats, camera, scratch)
+            for stage in range(STAGES):
+                if stage > 0:
+                    find_farthest(rows[1] - rows[0], count, stride, scratch.planes)
+                draw_surfels(draw_chord, is_hidden, place, stage, bounds, splats, camera, scratch)
             store_samples(rows, columns, count, stride, (height, width), view, scratch.planes, colors, depths)

@@ -34,10 +34,10 @@ from .volume_setup import (
 )
 from .volume_shared import LINE, SLAB_ROWS, Shared
 from .volume_modes import LEVELS
-from .volume_views import COMPOSITE, ISO, MIP, VIEWS_AT_ONCE, Ways, draw_rows, draw_shared_rows
+from .volume_views import COMPOSITE, ISO, MIP, Ways, draw_rows, draw_shared_rows
 
 MODES = ("composite", "mip", "iso")  # in the order of volume_views
-FINE = (1 / 8, 1 / 2)  # of a voxel: least and greatest distance of samples on a slice
+FINE = (1 / 8, 1 / 3)  # of a voxel: least and greatest distance of samples on a slice
 MAX_PERIOD = 16  # pixels of a table's period, up to which its lines are drawn like views
 PER_PIXEL = 1.4  # distance of samples on a slice, in pixels of the nearest one
 FINE_VIEWS = 2  # positions of a shared slab per pixel
@@ -108,7 +108,7 @@ def make_cut(
         first,
         step,
         low,
-        (TABLE - 1.0) / max(high - low, 1e-300),
+        (TABLE - 1.0) / (high - low if high > low else 1.0),
         np.ascontiguousarray(camera.eye_from_world[:3, :3], dtype=np.float32),
         lights,
         channels,
@@ -171,7 +171,7 @@ def draw_volume_views(
     if slices is None:
         return
     numbers = camera_numbers(camera)
-    views, height, width, _ = color.shape
+    views, height, _, _ = color.shape
     wants_depth = depth.size > 0 and (opaque or options.depth)
     for group in volume_groups(prepared, opaque):
         made = [make_cut(prepared, index, draw, slices, memory) for index in group]
@@ -181,24 +181,19 @@ def draw_volume_views(
         if composite and len(group) == 1 and options.volume == "shared" and views > 1 and depth.size == 0:
             _draw_shared(cuts[0], ways[0], draw, slices, counts[0], color, memory)
             continue
-        own_eyes = ways[0].own_eyes and any(way.light[0] > way.light[1] for way in ways)
-        together = min(1 if own_eyes and composite else VIEWS_AT_ONCE, views)
-        count = together * -(-width // RAYS) * BLOCK_ROWS * ROW
         channels = [way.light[0] for way in ways]
         pool = memory.pool(
-            (("volume rays", *group), *counts, slices.slabs, *channels, count),
-            lambda counts=counts, channels=channels, count=count: (
+            (("volume rays", *group), *counts, slices.slabs, *channels),
+            lambda counts=counts, channels=channels: (
                 tuple(new_planes(n, slices, c) for n, c in zip(counts, channels, strict=True)),
-                np.zeros(count, np.float32),
+                np.zeros(BLOCK_ROWS * ROW, np.float32),
                 np.zeros(ROW, np.int32),
             ),
         )
 
-        def task(
-            first: int, end: int, cuts: Any = cuts, ways: Any = ways, pool: Any = pool, together: int = together
-        ) -> None:
+        def task(first: int, end: int, cuts: Any = cuts, ways: Any = ways, pool: Any = pool) -> None:
             with pool as (planes, rays, packed):
-                args = (ways, draw.offsets, together, wants_depth, planes, rays, packed)
+                args = (ways, draw.offsets, wants_depth, planes, rays, packed)
                 draw_rows((first, end), cuts, numbers, slices, *args, color, depth)
 
         run_rows(height, task)
@@ -286,7 +281,7 @@ def _panel_pool(
         scratch = (
             np.zeros(3 * width, np.float32),
             np.zeros(width, np.float64),
-            np.zeros(BLOCK_ROWS * ROW * (blocks if period < 0 else 1), np.float32),
+            np.zeros(BLOCK_ROWS * ROW, np.float32),
             np.zeros(ROW, np.int32),
             np.zeros(3 * max(period, 0) * SLAB_ROWS * LINE, np.float32),
             np.zeros(PIXEL_ROWS * ROW * blocks if period == 0 else 0, np.float32),

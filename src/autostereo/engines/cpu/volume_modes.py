@@ -9,6 +9,7 @@ from .volume_rays import (
     B,
     BACK,
     FRONT,
+    FRONT_LIGHT,
     G,
     HALF,
     LEAVE,
@@ -21,8 +22,7 @@ from .volume_rays import (
     TURN,
     ZERO,
     block_bounds,
-    locate_rays,
-    sample_rays,
+    sample_volume,
     seen,
     share_of_slab,
 )
@@ -33,22 +33,20 @@ NONE = np.float32(-1.0)
 
 
 @inlined
-def sample_ends(n, base, k, first, fresh, cut, slices, planes, rays, index):
+def sample_ends(n, base, k, fresh, cut, row, slices, planes, rays):
     """Scalars at both ends of slab k into FRONT and BACK."""
     depth = slices.first + k * slices.distance
     if fresh:
         for i in range(n):
             rays[base + FRONT + i] = rays[base + BACK + i]
     else:
-        locate_rays(n, base, depth, cut, planes.values.shape[2], rays, index)
-        sample_rays(n, base, planes.values[k - first, 0], FRONT, rays, index)
-    locate_rays(n, base, depth + slices.distance, cut, planes.values.shape[2], rays, index)
-    sample_rays(n, base, planes.values[k - first + 1, 0], BACK, rays, index)
+        sample_volume(n, base, depth, cut, row, False, planes, FRONT, FRONT_LIGHT, rays)
+    sample_volume(n, base, depth + slices.distance, cut, row, False, planes, BACK, FRONT_LIGHT, rays)
     share_of_slab(n, base, depth, slices.distance, rays)
 
 
 @kernel
-def march_mip(n, base, cut, slices, first, last, planes, rays, index):
+def march_mip(n, base, cut, row, slices, first, last, planes, rays):
     """Keep the greatest scalar (as a row of the table) of slabs first … last in R, −1 so far, and its depth in HALF."""
     bounds, fresh = block_bounds(n, base, rays), False
     for k in range(first, last):
@@ -58,7 +56,7 @@ def march_mip(n, base, cut, slices, first, last, planes, rays, index):
         ):
             fresh = False
             continue
-        sample_ends(n, base, k, first, fresh, cut, slices, planes, rays, index)
+        sample_ends(n, base, k, fresh, cut, row, slices, planes, rays)
         near, far = np.float32(depth), np.float32(depth + slices.distance)
         for i in range(n):
             front, back = rays[base + FRONT + i], rays[base + BACK + i]
@@ -88,7 +86,7 @@ def resolve_mip(n, base, colors, rays):
 
 
 @kernel
-def march_iso(n, base, cut, slices, first, last, level, planes, rays, index):
+def march_iso(n, base, cut, row, slices, first, last, level, planes, rays):
     """Find in which slab of first … last a ray first crosses `level`, a row of the table; HALF becomes its depth."""
     bounds, fresh, iso = block_bounds(n, base, rays), False, np.float32(level)
     for k in range(first, last):
@@ -98,7 +96,7 @@ def march_iso(n, base, cut, slices, first, last, level, planes, rays, index):
         ):
             fresh = False
             continue
-        sample_ends(n, base, k, first, fresh, cut, slices, planes, rays, index)
+        sample_ends(n, base, k, fresh, cut, row, slices, planes, rays)
         near, distance = np.float32(depth), np.float32(slices.distance)
         for i in range(n):
             front, back = rays[base + FRONT + i] - iso, rays[base + BACK + i] - iso

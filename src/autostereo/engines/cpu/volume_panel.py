@@ -11,10 +11,10 @@ import numpy as np
 
 from .jit import inlined, kernel
 from .panel_lines import row_offsets
-from .volume_rays import B, BLOCK_ROWS, END, G, HALF, LENGTH, ONE, OPAQUE, ORIGIN, R, RAYS, ROW, T, TURN, ZERO
+from .volume_rays import B, BLOCK_ROWS, END, G, HALF, LENGTH, ONE, ORIGIN, R, RAYS, ROW, T, TURN, ZERO
 from .volume_sample import SLABS, hide_runs, keep_alive, mark_runs
 from .volume_shared import ALPHA, LINE, RED, SLAB_ROWS, classify_slabs, next_run, shift_of
-from .volume_views import MIP, clear_rays, hide_behind_rays, march_volumes, mark_volumes, next_slices, over, resolve_rays
+from .volume_views import HIDDEN, mark_volumes, next_slices, over, trace_rays
 
 AT, MOVE, SHARE_R, CUT_R, A0, A1, C0, C1, SUM, THROUGH = (np.uint64(k * ROW) for k in range(10))
 PIXEL_ROWS = 10
@@ -151,7 +151,7 @@ def hide_behind_panel(width, period, offsets, camera, cut, slices, k, last, plan
                     through = line[np.uint64(((i % period) * 3 + c) * SLAB_ROWS * LINE + i // period) + ALPHA]
                 else:
                     through = pixels[np.uint64((3 * (i // RAYS) + c) * PIXEL_ROWS * ROW + i % RAYS) + THROUGH]
-                if through >= OPAQUE:
+                if through >= HIDDEN:
                     o = offsets[c * width + i]
                     low, high, dark = min(low, o), max(high, o), False
             if not dark:
@@ -206,7 +206,7 @@ def draw_panel_rows(rows, cut, camera, slices, ways, panel, period, averaged, pl
             last = min(k + SLABS, slices.slabs)
             if k > 0:
                 hide_behind_panel(width, period, offsets, camera, cut, slices, k, last, planes, line, pixels)
-            next_slices(cut, 0.0, row, slices, k, last, SLABS, planes)
+            next_slices(cut, row, slices, k, last, planes)
             args = (ways.table, ways.material, ways.light, planes, shared, rays, index)
             classify_slabs(cut, camera, row, slices, k, last, *args)
             if period == 0:
@@ -246,48 +246,37 @@ def even_sub_pixel(x, offset, middle, camera, row, total, through):
 def draw_panel_rays(rows, cuts, camera, slices, ways, panel, wants_depth, planes, scratch, color, depth):
     """Draw rows (first, end) of the picture, every sub-pixel along its own ray, over the panel color (H, W, 3).
 
-    cuts, ways, planes: of each volume, see volume_views.draw_rows; depth (H, W, 3) or of no size.
+    cuts, ways, planes, depth (H, W, 3): see volume_views.draw_rows.
     """
     offsets, u, rays, index, _, _ = scratch
     height, width, _ = color.shape
-    blocks, n = 3 * -(-width // RAYS), np.uint64(RAYS)
     far = slices.first + slices.slabs * slices.distance
     opaque = depth.shape[0] > 0
-    chunk = SLABS if len(cuts) == 1 else 1
     for r in range(rows[0], rows[1]):
         row = ((camera.centre_y - (r + 0.5)) / camera.fy - camera.offset_y / camera.focal, camera.offset_y)
         if mark_volumes(cuts, row, slices, planes) == 0:
             continue
         shown = height - 1 - r if panel.flip_y else r
         row_offsets(shown, width, panel.flip_x, (0, width), 0, 0, width, panel.plan, u, offsets)
-        for b in range(blocks):
-            base, c = np.uint64(b * BLOCK_ROWS * ROW), b % 3
-            clear_rays(n, base, ways[0].mode, rays)
-            for i in range(RAYS):
-                x, k = min((b // 3) * RAYS + i, width - 1), np.uint64(i)
-                o = np.float64(offsets[c * width + x])
-                at = x + place_in_pixel(panel.subpixel, c)
-                turn = (at + 0.5 - camera.centre_x) / camera.fx - o / camera.focal
-                rays[base + ORIGIN + k] = np.float32(o)
-                rays[base + TURN + k] = np.float32(turn)
-                rays[base + LENGTH + k] = np.float32(np.sqrt(1.0 + row[0] * row[0] + turn * turn))
-                rays[base + END + k] = np.float32(far)
-                if opaque:
+        for c in range(3):
+            for first in range(0, width, RAYS):
+                for i in range(RAYS):
+                    x, k = min(first + i, width - 1), np.uint64(i)
+                    o = np.float64(offsets[c * width + x])
+                    at = x + place_in_pixel(panel.subpixel, c)
+                    turn = (at + 0.5 - camera.centre_x) / camera.fx - o / camera.focal
+                    rays[ORIGIN + k] = np.float32(o)
+                    rays[TURN + k] = np.float32(turn)
+                    rays[LENGTH + k] = np.float32(np.sqrt(1.0 + row[0] * row[0] + turn * turn))
+                    rays[END + k] = np.float32(far)
+                    if opaque:
+                        column = width - 1 - x if panel.flip_x else x
+                        rays[END + k] = min(np.float32(far), depth[shown, column, c])
+                trace_rays(cuts, row, slices, ways, wants_depth, planes, rays, index)
+                for i in range(min(RAYS, width - first)):
+                    x, k = first + i, np.uint64(i)
                     column = width - 1 - x if panel.flip_x else x
-                    rays[base + END + k] = min(np.float32(far), depth[shown, column, c])
-        for k in range(0, slices.slabs, chunk):
-            last = min(k + chunk, slices.slabs)
-            if k > 0 and len(cuts) == 1 and ways[0].mode != MIP:
-                hide_behind_rays(blocks, cuts[0], slices, k, last, ways[0].mode, planes[0], rays)
-            for v in range(len(cuts)):
-                next_slices(cuts[v], 0.0, row, slices, k, last, chunk, planes[v])
-            march_volumes(blocks, cuts, row, slices, k, last, ways, wants_depth, planes, rays, index)
-        resolve_rays(blocks, cuts[0], row, slices, ways[0], rays)
-        for x in range(width):
-            column = width - 1 - x if panel.flip_x else x
-            for c in range(3):
-                k = np.uint64((3 * (x // RAYS) + c) * BLOCK_ROWS * ROW + x % RAYS)
-                total = rays[k + R] if c == 0 else (rays[k + G] if c == 1 else rays[k + B])
-                color[shown, column, c] = over(total, rays[k + T], color[shown, column, c])
-                if wants_depth:
-                    depth[shown, column, c] = min(depth[shown, column, c], rays[k + HALF])
+                    total = rays[k + R] if c == 0 else (rays[k + G] if c == 1 else rays[k + B])
+                    color[shown, column, c] = over(total, rays[k + T], color[shown, column, c])
+                    if wants_depth:
+                        depth[shown, column, c] = min(depth[shown, column, c], rays[k + HALF])

@@ -11,7 +11,7 @@ import numpy as np
 
 from .jit import inlined, kernel
 from .mesh_shade import exp2_fast
-from .volume_sample import SLABS, any_marked
+from .volume_sample import AT, EYE, LIGHT, LIST, VALUE, any_marked, on_slice, sample_points
 
 RAYS = 128  # of a block
 ROW = 144  # distance of a block's rows
@@ -22,7 +22,7 @@ ROW = 144  # distance of a block's rows
 BLOCK_ROWS = 30
 ZERO, ONE, HALF_WAY = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 TEN_BITS, COLOR_STEP = np.int32(1023), np.float32(1.0 / 1023.0)
-OPAQUE = np.float32(1.0 / 512.0)
+OPAQUE = 128  # transmittance in 65536ths, below which a ray has seen enough
 
 
 @inlined
@@ -79,12 +79,29 @@ def sample_rays(n, base, line, target, rays, index):
 
 
 @inlined
-def sample_fields(n, base, depth, cut, values, scalar, light, rays, index):
-    """Scalars and light at a slice's depth into rows `scalar` and, by channel, `light` and on."""
+def sample_grid(n, base, depth, cut, values, scalar, light, rays, index):
+    """Scalars and light of a sampled slice into rows `scalar` and, by channel, `light` and on."""
     locate_rays(n, base, depth, cut, values.shape[1], rays, index)
     sample_rays(n, base, values[0], scalar, rays, index)
     for f in range(cut.channels):
         sample_rays(n, base, values[1 + f], light + np.uint64(f * ROW), rays, index)
+
+
+@kernel
+def sample_volume(n, base, depth, cut, row, own_eyes, planes, scalar, light, rays):
+    """Scalars and light of the volume itself where rays cross a depth, into rows `scalar` and `light` and on."""
+    lists, d, own = planes.lists, np.float32(depth), ONE if own_eyes else ZERO
+    for i in range(n):
+        lists[AT + i] = rays[base + ORIGIN + i] + d * rays[base + TURN + i]
+        lists[EYE + i] = own * rays[base + ORIGIN + i]
+    y = row[1] + depth * row[0]
+    sample_points(n, cut, y, depth, on_slice(cut, row, depth), planes.place, planes.words, lists)
+    for i in range(n):
+        rays[base + scalar + i] = lists[VALUE + i]
+    for f in range(cut.channels):
+        to, of = light + np.uint64(f * ROW), LIGHT + np.uint64(f * LIST)
+        for i in range(n):
+            rays[base + to + i] = lists[of + i]
 
 
 @inlined
@@ -185,41 +202,40 @@ def seen(bounds, depth, cut, marks, k):
 
 
 @kernel
-def march(n, base, cut, slices, first, last, table, material, light, wants_half, planes, rays, packed):
-    """Take a block of rays through slabs first … last, whose slices are in planes.values from 0 on."""
+def march(n, base, cut, row, slices, first, last, way, wants_half, planes, rays, packed):
+    """Take a block of rays through slabs first … last; way: see volume_views.Ways."""
     fresh = False
-    material = (np.float32(material[0]), np.float32(material[1]), np.float32(material[2]))
-    deepest = ZERO
-    for i in range(n):
-        deepest = max(deepest, rays[base + T + i])
-    if deepest < OPAQUE:
-        return
+    material = (np.float32(way.material[0]), np.float32(way.material[1]), np.float32(way.material[2]))
     bounds = block_bounds(n, base, rays)
     for k in range(first, last):
+        through = np.int32(0)
+        for i in range(n):  # in whole numbers, for a maximum of floats is not SIMD
+            through = max(through, np.int32(rays[base + T + i] * np.float32(65536.0)))
+        if through < OPAQUE:
+            return
         depth = slices.first + k * slices.distance
         after = depth + slices.distance
         if not (seen(bounds, depth, cut, planes.marks, k) or seen(bounds, after, cut, planes.marks, k + 1)):
             fresh = False
             continue
         if not fresh:
-            sample_fields(n, base, depth, cut, planes.values[k - first], FRONT, FRONT_LIGHT, rays, packed)
-        values = planes.values[k - first + 1]
-        sample_fields(n, base, depth + slices.distance, cut, values, BACK, BACK_LIGHT, rays, packed)
+            sample_volume(n, base, depth, cut, row, way.own_eyes, planes, FRONT, FRONT_LIGHT, rays)
+        sample_volume(n, base, after, cut, row, way.own_eyes, planes, BACK, BACK_LIGHT, rays)
         share_of_slab(n, base, depth, slices.distance, rays)
-        classify(n, base, table.extinction, table.color, rays, packed)
+        classify(n, base, way.table.extinction, way.table.color, rays, packed)
         for i in range(n):
             optical = rays[base + OPTICAL + i] * rays[base + SHARE + i] * rays[base + LENGTH + i]
             rays[base + SHARE + i] = ONE - exp2_fast(-optical)
         if wants_half:
             for i in range(n):
                 rays[base + OPTICAL + i] = rays[base + T + i]
-        blend(n, base, material, light, rays, packed)
+        blend(n, base, material, way.light, rays, packed)
         if wants_half:
             find_half(n, base, depth, slices.distance, rays)
         for i in range(n):
             rays[base + FRONT + i] = rays[base + BACK + i]
-        for f in range(light[0]):
-            row = np.uint64(f * ROW)
+        for f in range(way.light[0]):
+            lane = np.uint64(f * ROW)
             for i in range(n):
-                rays[base + FRONT_LIGHT + row + i] = rays[base + BACK_LIGHT + row + i]
+                rays[base + FRONT_LIGHT + lane + i] = rays[base + BACK_LIGHT + lane + i]
         fresh = True

@@ -20,8 +20,8 @@ CHUNK = 4  # log2 of samples in a run
 SLABS = 16  # slabs between slices that are handled together
 LIST = 272  # room for the samples that are handled at once
 AT_ONCE = 256
-PX, PY, PZ, VALUE, NX, NY, NZ, DIFFUSE, SHINE, LIGHT = (np.uint64(k * LIST) for k in range(10))
-LIST_ROWS = 16
+AT, EYE, PX, PY, PZ, VALUE, NX, NY, NZ, DIFFUSE, SHINE, LIGHT = (np.uint64(k * LIST) for k in range(12))
+LIST_ROWS = 18
 W0, W1, W2, W3, W4, W5, W6, W7 = (np.uint64(k * LIST) for k in range(8))
 ZERO, ONE, TINY = np.float32(0.0), np.float32(1.0), np.float32(1e-20)
 
@@ -132,12 +132,12 @@ def mark_runs(cut, row, slices, marks, wanted):
 
 @inlined
 def locate(n, start, direction, shape, place, lists):
-    """First of the eight voxels around n samples at start + i·direction, clamped to the grid, and the parts beyond."""
+    """First of the eight voxels around n samples at start + AT·direction, clamped to the grid, and the parts beyond."""
     x, y, z = np.float32(start[0]), np.float32(start[1]), np.float32(start[2])
     dx, dy, dz = np.float32(direction[0]), np.float32(direction[1]), np.float32(direction[2])
     ex, ey, ez = np.float32(shape[0] - 1), np.float32(shape[1] - 1), np.float32(shape[2] - 1)
     for i in range(n):
-        t = np.float32(i)
+        t = lists[AT + i]
         u, v, w = min(max(x + t * dx, ZERO), ex), min(max(y + t * dy, ZERO), ey), min(max(z + t * dz, ZERO), ez)
         a, b, c = min(np.floor(u), ex - ONE), min(np.floor(v), ey - ONE), min(np.floor(w), ez - ONE)
         lists[PX + i], lists[PY + i], lists[PZ + i] = u - a, v - b, w - c
@@ -178,13 +178,13 @@ def interpolate(n, up, down, row, words, lists):
 
 
 @inlined
-def light_samples(n, cut, eye, x, y, depth, lists):
-    """Light on n samples from X = x on, of which lists hold the gradients in world space, into LIGHT and on.
+def light_samples(n, cut, y, depth, lists):
+    """Light on n samples at X = AT, of which lists hold the gradients in world space, into LIGHT and on.
 
-    Both sides of a normal are lit alike: |N·L|, |N·H|; eye: X of the eye that highlights are for.
+    Both sides of a normal are lit alike: |N·L|, |N·H|; EYE: X of the eye that highlights are for.
     """
     m, row = cut.rotation, np.uint64(LIST)
-    step, px, py, pz = np.float32(cut.step), np.float32(x), np.float32(y), np.float32(depth)
+    py, pz = np.float32(y), np.float32(depth)
     for i in range(n):
         a, b, c = lists[NX + i], lists[NY + i], lists[NZ + i]
         u = m[0, 0] * a + m[0, 1] * b + m[0, 2] * c
@@ -197,12 +197,12 @@ def light_samples(n, cut, eye, x, y, depth, lists):
         for i in range(n):
             lists[first + i] = ZERO
     specular = cut.channels > cut.colors
-    vy, vz, shininess, eye = np.float32(cut.lens) - py, -pz, np.float32(cut.shininess), np.float32(eye)
+    vy, vz, shininess = np.float32(cut.lens) - py, -pz, np.float32(cut.shininess)
     for k in range(cut.lights.shape[0]):
         lx, ly, lz = cut.lights[k, 1], cut.lights[k, 2], cut.lights[k, 3]
         p = cut.lights[k, 0]
         for i in range(n):
-            at = px + np.float32(i) * step
+            at = lists[AT + i]
             tx, ty, tz = lx - p * at, ly - p * py, lz - p * pz
             scale = ONE / np.sqrt(max(tx * tx + ty * ty + tz * tz, TINY))
             lists[PX + i], lists[PY + i], lists[PZ + i] = tx * scale, ty * scale, tz * scale
@@ -212,7 +212,7 @@ def light_samples(n, cut, eye, x, y, depth, lists):
             )
         if specular:
             for i in range(n):
-                vx = eye - (px + np.float32(i) * step)
+                vx = lists[EYE + i] - lists[AT + i]
                 scale = ONE / np.sqrt(max(vx * vx + vy * vy + vz * vz, TINY))
                 hx, hy, hz = lists[PX + i] + vx * scale, lists[PY + i] + vy * scale, lists[PZ + i] + vz * scale
                 scale = ONE / np.sqrt(max(hx * hx + hy * hy + hz * hz, TINY))
@@ -236,11 +236,13 @@ def light_samples(n, cut, eye, x, y, depth, lists):
 
 
 @inlined
-def sample_run(n, cut, eye, x, y, depth, start, place, words, lists):
-    """Scalars, as rows of the table, and light of n ≤ 256 samples from X = x on, into lists."""
+def sample_points(n, cut, y, depth, start, place, words, lists):
+    """Scalars, as rows of the table, into VALUE, and light into LIGHT and on, of n ≤ 256 samples at X = AT.
+
+    start: index coordinates of X = 0 at this Y and depth (on_slice).
+    """
     m = cut.index
-    begin = (start[0] + x * m[0, 0], start[1] + x * m[1, 0], start[2] + x * m[2, 0])
-    locate(n, begin, (m[0, 0] * cut.step, m[1, 0] * cut.step, m[2, 0] * cut.step), cut.shape, place, lists)
+    locate(n, start, (m[0, 0], m[1, 0], m[2, 0]), cut.shape, place, lists)
     low, scale = np.float32(cut.low), np.float32(cut.scale)
     together = cut.channels > 0 and cut.scalars.itemsize == 1
     if not together:
@@ -257,12 +259,12 @@ def sample_run(n, cut, eye, x, y, depth, start, place, words, lists):
     for i in range(n):
         lists[VALUE + i] = (lists[VALUE + i] - low) * scale
     if cut.channels > 0:
-        light_samples(n, cut, eye, x, y, depth, lists)
+        light_samples(n, cut, y, depth, lists)
 
 
 @kernel
-def sample_slice(cut, eye, row, slices, k, planes, into):
-    """Sample slice k into planes.values[into]; runs that are not wanted get the scalar of their middle."""
+def sample_slice(cut, row, slices, k, planes, into):
+    """Sample slice k into planes.values[into], lit for the centre eye; unwanted runs get the scalar of their middle."""
     runs = planes.wanted.shape[1]
     depth = slices.first + k * slices.distance
     start, y = on_slice(cut, row, depth), row[1] + depth * row[0]
@@ -275,14 +277,17 @@ def sample_slice(cut, eye, row, slices, k, planes, into):
             end += 1
         j = c << CHUNK
         n = np.uint64((end - c) << CHUNK)
+        first, step = np.float32(cut.first + j * cut.step), np.float32(cut.step)
         if wanted == 0:
-            x = cut.first + (j + (1 << (CHUNK - 1))) * cut.step
-            begin = (start[0] + x * m[0, 0], start[1] + x * m[1, 0], start[2] + x * m[2, 0])
-            locate(np.uint64(1), begin, begin, cut.shape, place, lists)
+            lists[AT] = first + np.float32(1 << (CHUNK - 1)) * step
+            locate(np.uint64(1), start, (m[0, 0], m[1, 0], m[2, 0]), cut.shape, place, lists)
             value = np.float32((np.float64(cut.scalars[np.uint64(place[0])]) - cut.low) * cut.scale)
             values[into, 0, j : j + (1 << CHUNK)] = value
         else:
-            sample_run(n, cut, eye, cut.first + j * cut.step, y, depth, start, place, planes.words, lists)
+            for i in range(n):
+                lists[AT + i] = first + np.float32(i) * step
+                lists[EYE + i] = ZERO
+            sample_points(n, cut, y, depth, start, place, planes.words, lists)
             for f in range(1 + cut.channels):
                 first = VALUE if f == 0 else LIGHT + np.uint64((f - 1) * LIST)
                 line = values[into, f, j:]

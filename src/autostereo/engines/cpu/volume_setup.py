@@ -163,7 +163,8 @@ class Table(NamedTuple):
 
 def make_table(transfer: TransferFunction, low: float, high: float, length: float) -> Table:
     """Return the table of slabs of a length in scene units for scalar values low … high."""
-    rgba = transfer.table(low, max(high, np.nextafter(low, np.inf)), TABLE, length).reshape(-1, 4)
+    high = high if high > low else low + max(abs(low), 1.0)
+    rgba = transfer.table(low, high, TABLE, length).reshape(-1, 4)
     optical = rgba[:, 3].astype(np.float64) * length
     c = np.floor(np.clip(rgba[:, :3], 0, 1) * 1023.0 + 0.5).astype(np.int32)
     return Table(

@@ -42,7 +42,7 @@ from .volume_rays import (
     block_bounds,
     classify,
     ray_stretch,
-    sample_fields,
+    sample_grid,
     seen,
     share_of_slab,
 )
@@ -118,9 +118,9 @@ def classify_slabs(cut, camera, row, slices, first, last, table, material, light
                             shared.values[clear + i] = ZERO
                     continue
                 if not fresh:
-                    sample_fields(n, base, depth, cut, planes.values[k - first], FRONT, FRONT_LIGHT, rays, packed)
+                    sample_grid(n, base, depth, cut, planes.values[k - first], FRONT, FRONT_LIGHT, rays, packed)
                 values = planes.values[k - first + 1]
-                sample_fields(n, base, depth + slices.distance, cut, values, BACK, BACK_LIGHT, rays, packed)
+                sample_grid(n, base, depth + slices.distance, cut, values, BACK, BACK_LIGHT, rays, packed)
                 share_of_slab(n, base, depth, slices.distance, rays)
                 classify(n, base, table.extinction, table.color, rays, packed)
                 for i in range(n):

@@ -16,7 +16,7 @@ from .volume_sample import SLABS, hide_runs, keep_alive, mark_runs, sample_slice
 from .volume_shared import ALPHA, BLUE, GREEN, LINE, RED, SLAB_ROWS, blend_view, classify_slabs, clear_line, even_out
 
 COMPOSITE, MIP, ISO = 0, 1, 2
-VIEWS_AT_ONCE = 8  # whose rays stay in cache
+HIDDEN = np.float32(OPAQUE / 65536.0)
 BYTE = np.float32(255.0)
 
 
@@ -38,65 +38,37 @@ class Ways(NamedTuple):
     own_eyes: bool
 
 
-@inlined
-def clear_rays(n, base, mode, rays):
-    """Rays that have seen nothing yet."""
+@kernel
+def trace_rays(cuts, row, slices, ways, wants_half, planes, rays, packed):
+    """Take a block of rays, of which ORIGIN, TURN, LENGTH and END are set, through volumes: colours, T and HALF.
+
+    Several volumes take turns slab by slab.
+    """
+    n, base, mode = np.uint64(RAYS), np.uint64(0), ways[0].mode
     for i in range(n):
-        rays[base + T + i] = ONE
-        rays[base + R + i] = NONE if mode == MIP else ZERO
-        rays[base + G + i] = ZERO
-        rays[base + B + i] = ZERO
-        rays[base + HALF + i] = np.float32(np.inf)
-
-
-@kernel
-def march_volumes(blocks, cuts, row, slices, k, last, ways, wants_half, planes, rays, packed):
-    """Take blocks of rays through slabs k … last of all volumes, whose slices are at hand; see draw_rows."""
-    n = np.uint64(RAYS)
-    for v in range(len(cuts)):
-        cut, way = cuts[v], ways[v]
-        for b in range(blocks):
-            base = np.uint64(b * BLOCK_ROWS * ROW)
-            if k == 0 or len(cuts) > 1:
-                ray_stretch(n, base, cut, row, slices.first, rays)
-            if way.mode == MIP:
-                march_mip(n, base, cut, slices, k, last, planes[v], rays, packed)
-            elif way.mode == ISO:
-                march_iso(n, base, cut, slices, k, last, way.level, planes[v], rays, packed)
+        rays[T + i] = ONE
+        rays[R + i] = NONE if mode == MIP else ZERO
+        rays[G + i] = ZERO
+        rays[B + i] = ZERO
+        rays[HALF + i] = np.float32(np.inf)
+    step = slices.slabs if len(cuts) == 1 else 1
+    for k in range(0, slices.slabs, step):
+        last = min(k + step, slices.slabs)
+        for v in range(len(cuts)):
+            cut, way = cuts[v], ways[v]
+            ray_stretch(n, base, cut, row, slices.first, rays)
+            if mode == MIP:
+                march_mip(n, base, cut, row, slices, k, last, planes[v], rays)
+            elif mode == ISO:
+                march_iso(n, base, cut, row, slices, k, last, way.level, planes[v], rays)
             else:
-                args = (way.table, way.material, way.light, wants_half)
-                march(n, base, cut, slices, k, last, *args, planes[v], rays, packed)
-
-
-@kernel
-def hide_behind_rays(blocks, cut, slices, k, last, mode, planes, rays):
-    """Leave out what all rays have seen enough before, in the slices of slabs k … last."""
-    n, near, far = np.uint64(RAYS), slices.first + k * slices.distance, slices.first + last * slices.distance
-    planes.alive[:] = np.uint8(0)
-    for b in range(blocks):
-        base = np.uint64(b * BLOCK_ROWS * ROW)
-        most = ZERO
-        for i in range(n):
-            through = rays[base + T + i] if mode == COMPOSITE else (ONE if rays[base + HALF + i] > far else ZERO)
-            most = max(most, through)
-        if most >= OPAQUE:
-            low, high, least, steepest = block_bounds(n, base, rays)
-            left, right = low + min(near * least, far * least), high + max(near * steepest, far * steepest)
-            keep_alive(left, right, cut, planes.alive)
-    hide_runs(k, last, planes)
-
-
-@kernel
-def resolve_rays(blocks, cut, row, slices, way, rays):
-    """Turn what rays found into colours, where that is not done on the way."""
-    for b in range(blocks):
-        base = np.uint64(b * BLOCK_ROWS * ROW)
-        if way.mode == MIP:
-            resolve_mip(np.uint64(RAYS), base, way.colors, rays)
-        elif way.mode == ISO:
-            color = (np.float64(way.colors[0, 0]), np.float64(way.colors[0, 1]), np.float64(way.colors[0, 2]))
-            args = (way.level, color, way.material, way.shade, way.own_eyes)
-            resolve_iso(RAYS, base, cut, row, slices, *args, rays)
+                march(n, base, cut, row, slices, k, last, way, wants_half, planes[v], rays, packed)
+    way = ways[0]
+    if mode == MIP:
+        resolve_mip(n, base, way.colors, rays)
+    elif mode == ISO:
+        color = (np.float64(way.colors[0, 0]), np.float64(way.colors[0, 1]), np.float64(way.colors[0, 2]))
+        resolve_iso(RAYS, base, cuts[0], row, slices, way.level, color, way.material, way.shade, way.own_eyes, rays)
 
 
 @inlined
@@ -130,14 +102,14 @@ def finish_rays(n, base, rays, color):
 
 
 @kernel
-def next_slices(cut, eye, row, slices, first, last, chunk, planes):
+def next_slices(cut, row, slices, first, last, planes):
     """Sample the slices of slabs first … last; that of the slabs before is at hand unless first is 0."""
     begin = first
     if first > 0:
-        planes.values[0] = planes.values[chunk]
+        planes.values[0] = planes.values[SLABS]
         begin = first + 1
     for k in range(begin, last + 1):
-        sample_slice(cut, eye, row, slices, k, planes, k - first)
+        sample_slice(cut, row, slices, k, planes, k - first)
 
 
 @kernel
@@ -150,52 +122,32 @@ def mark_volumes(cuts, row, slices, planes):
 
 
 @kernel
-def draw_rows(rows, cuts, camera, slices, ways, offsets, together, wants_depth, planes, rays, packed, color, depth):
+def draw_rows(rows, cuts, camera, slices, ways, offsets, wants_depth, planes, rays, packed, color, depth):
     """Draw rows (first, end) of every view, each along its own rays, over color (V, H, W, 4) and depth (V, H, W).
 
-    cuts, ways, planes: of each volume; several take turns slab by slab. So many views together use the same slices,
-    lit for the eye of the first (own_eyes) or of the centre.
+    cuts, ways, planes: of each volume; depth ends rays where it has a size, and takes part if wants_depth.
     """
     views, height, width, _ = color.shape
-    blocks = -(-width // RAYS)
     far = slices.first + slices.slabs * slices.distance
-    opaque, n = depth.shape[0] > 0, np.uint64(RAYS)
-    chunk = SLABS if len(cuts) == 1 else 1
+    opaque, n, base = depth.shape[0] > 0, np.uint64(RAYS), np.uint64(0)
     for r in range(rows[0], rows[1]):
         row = ((camera.centre_y - (r + 0.5)) / camera.fy - camera.offset_y / camera.focal, camera.offset_y)
         if mark_volumes(cuts, row, slices, planes) == 0:
             continue
-        for v0 in range(0, views, together):
-            v1, eye = min(v0 + together, views), offsets[v0] if ways[0].own_eyes else 0.0
-            for v in range(v0, v1):
-                for b in range(blocks):
-                    x = b * RAYS
-                    base = np.uint64(((v - v0) * blocks + b) * BLOCK_ROWS * ROW)
-                    start_rays(n, base, x, offsets[v], camera, row, rays)
-                    clear_rays(n, base, ways[0].mode, rays)
-                    for i in range(n):
-                        rays[base + END + i] = np.float32(far)
-                    if opaque:
-                        for i in range(np.uint64(min(RAYS, width - x))):
-                            rays[base + END + i] = min(np.float32(far), depth[v, r, x + i])
-            for k in range(0, slices.slabs, chunk):
-                last = min(k + chunk, slices.slabs)
-                if k > 0 and len(cuts) == 1 and ways[0].mode != MIP:
-                    args = (slices, k, last, ways[0].mode, planes[0], rays)
-                    hide_behind_rays((v1 - v0) * blocks, cuts[0], *args)
-                for v in range(len(cuts)):
-                    next_slices(cuts[v], eye, row, slices, k, last, chunk, planes[v])
-                march_volumes((v1 - v0) * blocks, cuts, row, slices, k, last, ways, wants_depth, planes, rays, packed)
-            resolve_rays((v1 - v0) * blocks, cuts[0], row, slices, ways[0], rays)
-            for v in range(v0, v1):
-                for b in range(blocks):
-                    x = b * RAYS
-                    end = min(x + RAYS, width)
-                    base = np.uint64(((v - v0) * blocks + b) * BLOCK_ROWS * ROW)
-                    finish_rays(np.uint64(end - x), base, rays, color[v, r, x:end])
-                    if wants_depth:
-                        for i in range(np.uint64(end - x)):
-                            depth[v, r, x + i] = min(depth[v, r, x + i], rays[base + HALF + i])
+        for v in range(views):
+            for x in range(0, width, RAYS):
+                end = min(x + RAYS, width)
+                start_rays(n, base, x, offsets[v], camera, row, rays)
+                for i in range(n):
+                    rays[END + i] = np.float32(far)
+                if opaque:
+                    for i in range(np.uint64(end - x)):
+                        rays[END + i] = min(np.float32(far), depth[v, r, x + i])
+                trace_rays(cuts, row, slices, ways, wants_depth, planes, rays, packed)
+                finish_rays(np.uint64(end - x), base, rays, color[v, r, x:end])
+                if wants_depth:
+                    for i in range(np.uint64(end - x)):
+                        depth[v, r, x + i] = min(depth[v, r, x + i], rays[HALF + i])
 
 
 @inlined
@@ -228,7 +180,7 @@ def hide_behind_views(views, width, offsets, camera, cut, slices, k, last, plane
         for x in range(0, width, RAYS):
             pixels, dark = min(RAYS, width - x), True
             for i in range(x, x + pixels):
-                dark = dark and line[t + np.uint64(i)] < OPAQUE
+                dark = dark and line[t + np.uint64(i)] < HIDDEN
             if not dark:
                 keep_group(x, pixels, offsets[v], near, far, camera, cut, planes.alive)
     hide_runs(k, last, planes)
@@ -249,7 +201,7 @@ def draw_shared_rows(rows, cut, camera, slices, ways, offsets, planes, shared, r
             last = min(k + SLABS, slices.slabs)
             if k > 0:
                 hide_behind_views(views, width, offsets, camera, cut, slices, k, last, planes, line)
-            next_slices(cut, 0.0, row, slices, k, last, SLABS, planes)
+            next_slices(cut, row, slices, k, last, planes)
             args = (ways.table, ways.material, ways.light, planes, shared, rays, packed)
             classify_slabs(cut, camera, row, slices, k, last, *args)
             for v in range(views):
