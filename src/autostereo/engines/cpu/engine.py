@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,10 +82,10 @@ class CpuEngine:
             camera = replace(draw.camera, shift=(0.5 - x, 0.5 - y))
             self._draw_stages(prepared, replace(draw, camera=camera, options=options), target)
             sums += target.color
-            if nearest is not None:
+            if nearest is not None and target.depth is not None:
                 np.minimum(nearest, target.depth, out=nearest)
         target.color[...] = (sums + side * side // 2) // (side * side)
-        if nearest is not None:
+        if nearest is not None and target.depth is not None:
             target.depth[...] = nearest
 
     def _draw_stages(self, prepared: Prepared, draw: Draw, target: Target) -> None:

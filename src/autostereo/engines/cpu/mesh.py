@@ -111,9 +111,7 @@ def draw_mesh_panel(prepared: PreparedMeshes, draw: Draw, target: Target, memory
     def task(first: int, end: int) -> None:
         with pool as (block, scratch):
             bins = (first, end, rows, blocks, columns)
-            draw_panel(
-                bins, surface, camera, shader, panel, block, background, side, scratch, target.color, depth
-            )
+            draw_panel(bins, surface, camera, shader, panel, block, background, side, scratch, target.color, depth)
             count_samples(target, scratch)
 
     run_rows(-(-height // rows) * blocks, task)
@@ -203,7 +201,9 @@ def surface_at(
         )
     side = round(options.samples**0.5)
     bands = (bins[0], 0.5 / side, 1.0 - 0.5 / side, float(bins[1]), bins[2])
-    triangles, bin_start, binned = _binned((prepared.arrays, memory), (faces, face_ids, vertices), numbers, draw.culling, bands)
+    triangles, bin_start, binned = _binned(
+        (prepared.arrays, memory), (faces, face_ids, vertices), numbers, draw.culling, bands
+    )
     columns = 6 if per_sample or arrays.materials[:, 2].any() else 3
     surface = Surface(
         vertices, attributes, uv, triangles, bin_start, binned, arrays.face_material, arrays.materials, columns
@@ -242,7 +242,11 @@ def _clipped(arrays: SceneArrays, e: Any, camera: CameraNumbers, held: tuple[Any
 
 
 def _binned(
-    held: tuple[SceneArrays, Memory], mesh: tuple[Any, ...], camera: CameraNumbers, culling: tuple[float, float], bands: Any
+    held: tuple[SceneArrays, Memory],
+    mesh: tuple[Any, ...],
+    camera: CameraNumbers,
+    culling: tuple[float, float],
+    bands: Any,
 ) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.int32]]:
     """Visible triangles, and the triangles of each band in the order of faces."""
     arrays, memory = held

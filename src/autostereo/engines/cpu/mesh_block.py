@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .jit import inlined
-from .mesh_raster import edge_through, cut_edge, fill_segment, fill_uv, row_geometry, rows_of, uv_gradient
+from .mesh_raster import cut_edge, edge_through, fill_segment, fill_uv, row_geometry, rows_of, uv_gradient
 from .mesh_shade import ZERO
 
 NO_GRADIENT = (ZERO,) * 11

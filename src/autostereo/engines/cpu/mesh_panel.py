@@ -386,7 +386,9 @@ def draw_panel(bins, surface, camera, shader, panel, block, background, side, sc
             if side > 1:
                 take_means(count, base, plane, side * side, scratch.band, scratch.sums)
             if depth.size > 0:
-                store_depth(row, columns, drawn, base, plane, np.float32(camera.focal), panel.flip_x, scratch.band, depth)
+                store_depth(
+                    row, columns, drawn, base, plane, np.float32(camera.focal), panel.flip_x, scratch.band, depth
+                )
             start, end = row * width * 3, (row + 1) * width * 3 - 3
             begin = end if panel.flip_x else start
             store_background(begin + step * columns[0], step, drawn[0] - columns[0], background, flat)

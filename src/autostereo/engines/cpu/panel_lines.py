@@ -29,8 +29,8 @@ class LinePlan(NamedTuple):
 
     map: its view map; offsets (V,) float64; period in pixels, a multiple of that of the table or the cells; step:
     phase from sample to sample, in (−½, ½], 0 for a table; first, slope: offset ≈ first + slope·phase, at most
-    `misfit` away; low, high: least and greatest offset of all; reach: length of the longest line in pixels; spacing, middle: offsets are
-    (k − middle)·spacing to the bit, or spacing is 0.
+    `misfit` away; low, high: least and greatest offset of all; reach: length of the longest line in pixels; spacing,
+    middle: offsets are (k − middle)·spacing to the bit, or spacing is 0.
     """
 
     map: MapArgs
@@ -190,7 +190,9 @@ def make_lines(row, width, flip, columns, base, x0, plane, plan, starts, lines, 
             t += m.offsets[cell, c]
             phi = t - np.floor(t)
             end = phi + (samples - 1) * step
-            for wrap in range(np.int64(np.floor(min(phi, end) - NEAR_WRAP)), np.int64(np.floor(max(phi, end) + NEAR_WRAP)) + 1):
+            for wrap in range(
+                np.int64(np.floor(min(phi, end) - NEAR_WRAP)), np.int64(np.floor(max(phi, end) + NEAR_WRAP)) + 1
+            ):
                 j0, j1 = 0, samples - 1
                 if abs(step) > 1e-9:
                     first, last = (wrap - NEAR_WRAP - phi) / step, (wrap + 1 + NEAR_WRAP - phi) / step

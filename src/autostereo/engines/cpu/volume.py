@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,15 @@ from ...errors import InputError
 from ...scene.scene import Scene
 from ...scene.volume import Volume
 from ..engine import Camera, Draw
+from ..options import Options
 from .memory import Memory
 from .mesh import panel_lines
 from .mesh_panel import Panel
-from .panel_lines import LinePlan
 from .mesh_setup import camera_numbers
+from .panel_lines import LinePlan
 from .scene_arrays import light_array
 from .threads import run_rows
+from .volume_modes import LEVELS
 from .volume_panel import PIXEL_ROWS, draw_panel_rays, draw_panel_rows
 from .volume_rays import BLOCK_ROWS, RAYS, ROW
 from .volume_sample import CHUNK, LIST, LIST_ROWS, SLABS, Cut, Planes, Slices
@@ -33,8 +36,7 @@ from .volume_setup import (
     shown_blocks,
 )
 from .volume_shared import LINE, SLAB_ROWS, Shared
-from .volume_modes import LEVELS
-from .volume_views import COMPOSITE, ISO, MIP, Ways, draw_rows, draw_shared_rows
+from .volume_views import ISO, MIP, Ways, draw_rows, draw_shared_rows
 
 MODES = ("composite", "mip", "iso")  # in the order of volume_views
 FINE = (1 / 8, 1 / 3)  # of a voxel: least and greatest distance of samples on a slice
@@ -75,14 +77,15 @@ def make_slices(volumes: list[Volume], camera: Camera, step: float) -> Slices | 
 
 
 def make_cut(
-    prepared: PreparedVolumes, index: int, draw: Draw, slices: Slices, memory: Memory
+    prepared: PreparedVolumes, index: int, draw: Draw, slices: Slices, shared: bool, memory: Memory
 ) -> tuple[Cut, Ways]:
     """How volume `index` is cut, lit and classified in this frame."""
     f, camera = prepared.fields[index], draw.camera
     volume = f.volume
     index_from_eye = np.linalg.inv(camera.eye_from_world @ volume.world_from_index)
     along = float(np.abs(index_from_eye[:3, 0]).max())  # voxels per unit of X
-    step = float(np.clip(PER_PIXEL * slices.first / camera.fx, FINE[0] / along, FINE[1] / along))
+    fine = FINE if shared else (0.5, 0.5)  # rays of their own need but the runs
+    step = float(np.clip(PER_PIXEL * slices.first / camera.fx, fine[0] / along, fine[1] / along))
     x = (camera.eye_from_world @ np.column_stack([volume.corners, np.ones(8)]).T)[0]
     first = float(x.min()) - 2.0 * step
     reach = int(np.ceil((8 * step * along + 1 + slices.distance * np.abs(index_from_eye[:3, 2]).max()) / (1 << BLOCK)))
@@ -129,7 +132,14 @@ def make_cut(
     own_eyes = draw.options.shading != "center" and (mode == ISO or draw.options.volume == "exact")
     light = (channels, light_colors)
     return cut, Ways(
-        mode, table, (m.ambient, m.diffuse, m.specular), light, np.ascontiguousarray(colors), level, volume.shade, own_eyes
+        mode,
+        table,
+        (m.ambient, m.diffuse, m.specular),
+        light,
+        np.ascontiguousarray(colors),
+        level,
+        volume.shade,
+        own_eyes,
     )
 
 
@@ -162,8 +172,25 @@ def volume_groups(prepared: PreparedVolumes, opaque: bool) -> list[list[int]]:
     return ([composite] if composite else []) + [[k] for k, mode in enumerate(modes) if mode == "mip"]
 
 
+def new_rays(counts: list[int], channels: list[int], slices: Slices) -> tuple[Any, ...]:
+    """One thread's memory for rays of their own: planes of each volume, a block of rays."""
+    planes = tuple(new_planes(n, slices, c) for n, c in zip(counts, channels, strict=True))
+    return planes, np.zeros(BLOCK_ROWS * ROW, np.float32), np.zeros(ROW, np.int32)
+
+
+def is_shared(prepared: PreparedVolumes, group: list[int], options: Options) -> bool:
+    """Whether the slabs of a group are shared by all views: one volume that composes, if the options allow."""
+    alone = len(group) == 1 and prepared.volumes[group[0]].mode == "composite"
+    return alone and (options.volume == "shared" or options.alpha == "averaged")
+
+
 def draw_volume_views(
-    prepared: PreparedVolumes, opaque: bool, draw: Draw, color: NDArray[np.uint8], depth: NDArray[np.float32], memory: Memory
+    prepared: PreparedVolumes,
+    opaque: bool,
+    draw: Draw,
+    color: NDArray[np.uint8],
+    depth: NDArray[np.float32],
+    memory: Memory,
 ) -> None:
     """Draw isosurfaces (opaque), or all else, over color (V, H, W, 4); depth (V, H, W), if it has a size, ends rays."""
     camera, options = draw.camera, draw.options
@@ -174,21 +201,17 @@ def draw_volume_views(
     views, height, _, _ = color.shape
     wants_depth = depth.size > 0 and (opaque or options.depth)
     for group in volume_groups(prepared, opaque):
-        made = [make_cut(prepared, index, draw, slices, memory) for index in group]
+        shared = is_shared(prepared, group, options) and views > 1 and depth.size == 0
+        made = [make_cut(prepared, index, draw, slices, shared, memory) for index in group]
         cuts, ways = tuple(cut for cut, _ in made), tuple(way for _, way in made)
         counts = [samples_of(prepared, index, camera, cut) for index, cut in zip(group, cuts, strict=True)]
-        composite = ways[0].mode == COMPOSITE
-        if composite and len(group) == 1 and options.volume == "shared" and views > 1 and depth.size == 0:
+        if shared:
             _draw_shared(cuts[0], ways[0], draw, slices, counts[0], color, memory)
             continue
         channels = [way.light[0] for way in ways]
         pool = memory.pool(
             (("volume rays", *group), *counts, slices.slabs, *channels),
-            lambda counts=counts, channels=channels: (
-                tuple(new_planes(n, slices, c) for n, c in zip(counts, channels, strict=True)),
-                np.zeros(BLOCK_ROWS * ROW, np.float32),
-                np.zeros(ROW, np.int32),
-            ),
+            partial(new_rays, counts, channels, slices),
         )
 
         def task(first: int, end: int, cuts: Any = cuts, ways: Any = ways, pool: Any = pool) -> None:
@@ -229,13 +252,20 @@ def _draw_shared(
 
     def task(first: int, end: int) -> None:
         with pool as (planes, shared, rays, packed, line):
-            draw_shared_rows((first, end), cut, numbers, slices, ways, offsets, planes, shared, rays, packed, line, color)
+            draw_shared_rows(
+                (first, end), cut, numbers, slices, ways, offsets, planes, shared, rays, packed, line, color
+            )
 
     run_rows(draw.camera.height, task)
 
 
 def draw_volume_panel(
-    prepared: PreparedVolumes, opaque: bool, draw: Draw, color: NDArray[np.uint8], depth: NDArray[np.float32], memory: Memory
+    prepared: PreparedVolumes,
+    opaque: bool,
+    draw: Draw,
+    color: NDArray[np.uint8],
+    depth: NDArray[np.float32],
+    memory: Memory,
 ) -> None:
     """Draw isosurfaces (opaque), or all else, over a panel color (H, W, 3); depth (H, W, 3) likewise."""
     camera, options = draw.camera, draw.options
@@ -243,35 +273,50 @@ def draw_volume_panel(
     if slices is None:
         return
     assert draw.viewmap is not None
-    plan, width = panel_lines(draw, memory), camera.width
+    plan = panel_lines(draw, memory)
     panel = Panel(plan, draw.flip_x, draw.flip_y, options.sampling == "subpixel")
     averaged = options.alpha == "averaged"
     numbers = camera_numbers(camera)
     for group in volume_groups(prepared, opaque):
-        made = [make_cut(prepared, index, draw, slices, memory) for index in group]
+        shared = is_shared(prepared, group, options) and (averaged or depth.size == 0)
+        made = [make_cut(prepared, index, draw, slices, shared, memory) for index in group]
         cuts, ways = tuple(cut for cut, _ in made), tuple(way for _, way in made)
         counts = [samples_of(prepared, index, camera, cut) for index, cut in zip(group, cuts, strict=True)]
-        shared = ways[0].mode == COMPOSITE and len(group) == 1
-        shared = shared and (averaged or (options.volume == "shared" and depth.size == 0))
         period = plan.period if draw.viewmap.table is not None and plan.period <= MAX_PERIOD and not averaged else 0
-        pool = _panel_pool(group, counts, [way.light[0] for way in ways], draw, slices, plan, period if shared else -1, memory)
+        pool = _panel_pool(
+            group, counts, [way.light[0] for way in ways], draw, slices, plan, period if shared else -1, memory
+        )
 
         def task(
-            first: int, end: int, cuts: Any = cuts, ways: Any = ways, pool: Any = pool, shared: bool = shared, period: int = period
+            first: int,
+            end: int,
+            cuts: Any = cuts,
+            ways: Any = ways,
+            pool: Any = pool,
+            shared: bool = shared,
+            period: int = period,
         ) -> None:
             with pool as (planes, slabs, scratch):
+                rows: Any = (first, end)
                 if shared:
-                    args = (panel, period, averaged, planes[0], slabs, scratch, color)
-                    draw_panel_rows((first, end), cuts[0], numbers, slices, ways[0], *args)
+                    one = (rows, cuts[0], numbers, slices, ways[0])
+                    draw_panel_rows(*one, panel, period, averaged, planes[0], slabs, scratch, color)
                 else:
-                    args = (panel, opaque and depth.size > 0, planes, scratch, color, depth)
-                    draw_panel_rays((first, end), cuts, numbers, slices, ways, *args)
+                    all_of = (rows, cuts, numbers, slices, ways)
+                    draw_panel_rays(*all_of, panel, opaque and depth.size > 0, planes, scratch, color, depth)
 
         run_rows(camera.height, task)
 
 
 def _panel_pool(
-    group: list[int], counts: list[int], channels: list[int], draw: Draw, slices: Slices, plan: LinePlan, period: int, memory: Memory
+    group: list[int],
+    counts: list[int],
+    channels: list[int],
+    draw: Draw,
+    slices: Slices,
+    plan: LinePlan,
+    period: int,
+    memory: Memory,
 ) -> Any:
     """Threads' memory for a panel; period: of lines, 0 where every sub-pixel is on its own, −1 without shared slabs."""
     camera, width = draw.camera, draw.camera.width

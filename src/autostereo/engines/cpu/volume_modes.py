@@ -6,21 +6,20 @@ import numpy as np
 
 from .jit import inlined, kernel
 from .volume_rays import (
-    B,
     BACK,
     FRONT,
     FRONT_LIGHT,
-    G,
     HALF,
     LEAVE,
-    LENGTH,
     ONE,
     ORIGIN,
-    R,
     SHARE,
-    T,
     TURN,
     ZERO,
+    B,
+    G,
+    R,
+    T,
     block_bounds,
     sample_volume,
     seen,
@@ -79,7 +78,11 @@ def resolve_mip(n, base, colors, rays):
             continue
         k = min(max(int(most * scale + np.float32(0.5)), 0), LEVELS - 1)
         a = colors[k, 3]
-        rays[base + R + i], rays[base + G + i], rays[base + B + i] = a * colors[k, 0], a * colors[k, 1], a * colors[k, 2]
+        rays[base + R + i], rays[base + G + i], rays[base + B + i] = (
+            a * colors[k, 0],
+            a * colors[k, 1],
+            a * colors[k, 2],
+        )
         rays[base + T + i] = ONE - a
         if a < np.float32(0.5):
             rays[base + HALF + i] = np.float32(np.inf)
@@ -141,7 +144,7 @@ def slope_at(cut, x, y, z, axis):
 @inlined
 def index_at(cut, row, x, depth):
     """Index coordinates of the point at X and depth of a row's plane."""
-    m, y = cut.index, row[1] + depth * row[0]
+    m, y = cut.from_eye, row[1] + depth * row[0]
     return (
         m[0, 0] * x + m[0, 1] * y + m[0, 2] * depth + m[0, 3],
         m[1, 0] * x + m[1, 1] * y + m[1, 2] * depth + m[1, 3],
@@ -180,14 +183,14 @@ def refine_hit(cut, row, origin, turn, depth, distance, level):
 @kernel
 def resolve_iso(n, base, cut, row, slices, level, color, material, shade, own_eyes, rays):
     """Refine the hits of rays, and shade them: Blinn–Phong, the normal turned to the viewer."""
-    m, e = cut.index, cut.rotation
+    m = cut.from_eye
     ambient, diffuse, specular = material
     for i in range(n):
-        k = base + np.uint64(i)
-        if not rays[k + HALF] < np.float32(1e30):
+        ray = base + np.uint64(i)
+        if not rays[ray + HALF] < np.float32(1e30):
             continue
-        origin, turn = np.float64(rays[k + ORIGIN]), np.float64(rays[k + TURN])
-        depth = refine_hit(cut, row, origin, turn, np.float64(rays[k + HALF]), slices.distance, level)
+        origin, turn = np.float64(rays[ray + ORIGIN]), np.float64(rays[ray + TURN])
+        depth = refine_hit(cut, row, origin, turn, np.float64(rays[ray + HALF]), slices.distance, level)
         x, y = origin + depth * turn, row[1] + depth * row[0]
         red, green, blue = color[0], color[1], color[2]
         if shade:
@@ -206,9 +209,9 @@ def resolve_iso(n, base, cut, row, slices, level, color, material, shade, own_ey
                 vx, vy, vz = vx * inverse, vy * inverse, vz * inverse
                 light = (ambient, ambient, ambient)
                 shine = (0.0, 0.0, 0.0)
-                for l in range(cut.lights.shape[0]):
-                    p = cut.lights[l, 0]
-                    lx, ly, lz = cut.lights[l, 1] - p * x, cut.lights[l, 2] - p * y, cut.lights[l, 3] - p * depth
+                for k in range(cut.lights.shape[0]):
+                    p = cut.lights[k, 0]
+                    lx, ly, lz = cut.lights[k, 1] - p * x, cut.lights[k, 2] - p * y, cut.lights[k, 3] - p * depth
                     inverse = 1.0 / max(np.sqrt(lx * lx + ly * ly + lz * lz), 1e-20)
                     lx, ly, lz = lx * inverse, ly * inverse, lz * inverse
                     nl = nx * lx + ny * ly + nz * lz
@@ -218,15 +221,15 @@ def resolve_iso(n, base, cut, row, slices, level, color, material, shade, own_ey
                     inverse = 1.0 / max(np.sqrt(hx * hx + hy * hy + hz * hz), 1e-20)
                     nh = max((nx * hx + ny * hy + nz * hz) * inverse, 0.0)
                     s = specular * nh**cut.shininess if specular > 0.0 else 0.0
-                    a, b, c = np.float64(cut.lights[l, 4]), np.float64(cut.lights[l, 5]), np.float64(cut.lights[l, 6])
+                    a, b, c = np.float64(cut.lights[k, 4]), np.float64(cut.lights[k, 5]), np.float64(cut.lights[k, 6])
                     d = diffuse * nl
                     light = (light[0] + d * a, light[1] + d * b, light[2] + d * c)
                     shine = (shine[0] + s * a, shine[1] + s * b, shine[2] + s * c)
                 red = red * light[0] + shine[0]
                 green = green * light[1] + shine[1]
                 blue = blue * light[2] + shine[2]
-        rays[k + R] = np.float32(min(max(red, 0.0), 1.0))
-        rays[k + G] = np.float32(min(max(green, 0.0), 1.0))
-        rays[k + B] = np.float32(min(max(blue, 0.0), 1.0))
-        rays[k + T] = ZERO
-        rays[k + HALF] = np.float32(depth)
+        rays[ray + R] = np.float32(min(max(red, 0.0), 1.0))
+        rays[ray + G] = np.float32(min(max(green, 0.0), 1.0))
+        rays[ray + B] = np.float32(min(max(blue, 0.0), 1.0))
+        rays[ray + T] = ZERO
+        rays[ray + HALF] = np.float32(depth)

@@ -11,7 +11,7 @@ import numpy as np
 
 from .jit import inlined, kernel
 from .panel_lines import row_offsets
-from .volume_rays import B, BLOCK_ROWS, END, G, HALF, LENGTH, ONE, ORIGIN, R, RAYS, ROW, T, TURN, ZERO
+from .volume_rays import END, HALF, LENGTH, ONE, ORIGIN, RAYS, ROW, TURN, ZERO, B, G, R, T
 from .volume_sample import SLABS, hide_runs, keep_alive, mark_runs
 from .volume_shared import ALPHA, LINE, RED, SLAB_ROWS, classify_slabs, next_run, shift_of
 from .volume_views import HIDDEN, mark_volumes, next_slices, over, trace_rays
@@ -48,7 +48,7 @@ def blend_line(x, offset, count, channel, camera, slices, first, last, shared, t
         j = max(q, 0)
         while True:
             begin, end = next_run(shared, k - first, j)
-            begin, end = max(begin - 1, j), min(end, shared.count - 1)
+            begin, end = max(begin - 1, j), min(end, shared.length - 1)
             i0, i1 = begin - q, min(end - q, count)
             if i0 >= count or begin >= end:
                 break
@@ -89,7 +89,7 @@ def blend_pixels(blocks, averaged, camera, slices, first, last, shared, pixels, 
     """Add slabs first … last to the sub-pixels of a row, in blocks of 64 for each channel, each at its own place."""
     n = np.uint64(RAYS)
     stride = PIXEL_ROWS * ROW
-    bound = np.float32(shared.count * shared.phases - 2)
+    bound = np.float32(shared.length * shared.phases - 2)
     for b in range(blocks):
         low, high = pixels[3 * b * stride + MOVE], pixels[3 * b * stride + MOVE]
         left, right = pixels[3 * b * stride + AT], pixels[3 * b * stride + AT]
@@ -103,7 +103,7 @@ def blend_pixels(blocks, averaged, camera, slices, first, last, shared, pixels, 
             begin = left - max(low * shift, high * shift)
             end = right - min(low * shift, high * shift)
             seen = False
-            for g in range(max(int(begin), 0) // RAYS, min((int(end) + 1) // RAYS, shared.count // RAYS - 1) + 1):
+            for g in range(max(int(begin), 0) // RAYS, min((int(end) + 1) // RAYS, shared.length // RAYS - 1) + 1):
                 seen = seen or shared.shown[k - first, g] != 0
             if not seen:
                 continue

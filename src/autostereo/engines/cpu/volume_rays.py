@@ -34,7 +34,7 @@ def ray_stretch(n, base, cut, row, near, rays):
     for i in range(n):
         rays[base + ENTER + i] = np.float32(near)
         rays[base + LEAVE + i] = rays[base + END + i]
-    m, slope, lens = cut.index, row[0], row[1]
+    m, slope, lens = cut.from_eye, row[0], row[1]
     for h in range(cut.halves.shape[0]):
         a, b, c, d = cut.halves[h, 0], cut.halves[h, 1], cut.halves[h, 2], cut.halves[h, 3]
         gx = np.float32(a * m[0, 0] + b * m[1, 0] + c * m[2, 0])

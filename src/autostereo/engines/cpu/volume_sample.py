@@ -29,7 +29,8 @@ ZERO, ONE, TINY = np.float32(0.0), np.float32(1.0), np.float32(1e-20)
 class Cut(NamedTuple):
     """How a volume is cut by the slices.
 
-    scalars, words, shape: see volume_setup; index (3, 4) float64: index_from_eye, of (X, Y, depth, 1); halves
+    scalars, words, shape: see volume_setup; from_eye (3, 4) float64: index coordinates of
+    (X, Y, depth, 1); halves
     (K, 4): half-spaces in index space; shown: blocks; first, step: X of the first sample and from sample to sample;
     low, scale: what makes a scalar a row of the table; rotation (3, 3) float32: eye_from_world; lights: see
     scene_arrays.light_array; channels of light that samples get, and colours among them: diffuse, one or for each
@@ -40,7 +41,7 @@ class Cut(NamedTuple):
     scalars: np.ndarray
     words: np.ndarray
     shape: np.ndarray
-    index: np.ndarray
+    from_eye: np.ndarray
     halves: np.ndarray
     shown: np.ndarray
     first: float
@@ -68,7 +69,8 @@ class Planes(NamedTuple):
     """One thread's memory for the slices at hand.
 
     values (SLABS + 1, fields, J) float32: table rows, then channels of light; marks, wanted (all slices, J / 16)
-    uint8: runs in which something shows, and runs that are to be sampled; place (J,) int64, part, normal (3, J) float32.
+    uint8: runs in which something shows, and runs that are to be sampled; alive (J / 16,) uint8: runs that are not yet
+    hidden; place (LIST,) int64, words int32, lists float32: scratch for the samples of a run.
     """
 
     values: np.ndarray
@@ -84,7 +86,7 @@ class Planes(NamedTuple):
 def on_slice(cut, row, depth):
     """Index coordinates of X = 0 on a slice; row = (slope of Y over depth, Y at the eyes)."""
     y = row[1] + depth * row[0]
-    m = cut.index
+    m = cut.from_eye
     return (
         m[0, 1] * y + m[0, 2] * depth + m[0, 3],
         m[1, 1] * y + m[1, 2] * depth + m[1, 3],
@@ -101,7 +103,7 @@ def mark_runs(cut, row, slices, marks, wanted):
     marked = 0
     runs = marks.shape[1]
     half = 0.5 * (1 << CHUNK) * cut.step
-    m = cut.index
+    m = cut.from_eye
     margin = (abs(m[0, 0]) * half + 1.0, abs(m[1, 0]) * half + 1.0, abs(m[2, 0]) * half + 1.0)
     nx, ny, nz = cut.shape[0], cut.shape[1], cut.shape[2]
     wanted[: slices.slabs + 1] = 0
@@ -109,18 +111,21 @@ def mark_runs(cut, row, slices, marks, wanted):
         x0, y0, z0 = on_slice(cut, row, slices.first + k * slices.distance)
         for c in range(runs):
             x = cut.first + (2 * c + 1) * half
-            i, j, l = x0 + x * cut.index[0, 0], y0 + x * cut.index[1, 0], z0 + x * cut.index[2, 0]
+            i, j, h = x0 + x * m[0, 0], y0 + x * m[1, 0], z0 + x * m[2, 0]
             inside = (
-                (i > -margin[0]) & (i < nx - 1 + margin[0])
-                & (j > -margin[1]) & (j < ny - 1 + margin[1])
-                & (l > -margin[2]) & (l < nz - 1 + margin[2])
+                (i > -margin[0])
+                & (i < nx - 1 + margin[0])
+                & (j > -margin[1])
+                & (j < ny - 1 + margin[1])
+                & (h > -margin[2])
+                & (h < nz - 1 + margin[2])
             )
             shows = False
             if inside:
                 i = min(max(i, 0.0), nx - 1.0001)
                 j = min(max(j, 0.0), ny - 1.0001)
-                l = min(max(l, 0.0), nz - 1.0001)
-                shows = cut.shown[int(l) >> BLOCK, int(j) >> BLOCK, int(i) >> BLOCK] != 0
+                h = min(max(h, 0.0), nz - 1.0001)
+                shows = cut.shown[int(h) >> BLOCK, int(j) >> BLOCK, int(i) >> BLOCK] != 0
             marks[k, c] = np.uint8(shows)
             if shows:
                 marked += 1
@@ -158,23 +163,40 @@ def bring(n, source, shape, place, words):
 
 
 @inlined
-def field(word, up, down):
-    """Some bits of a word, as a number with sign."""
-    return np.float32(np.int32(np.int32(word << up) >> down))
+def trilinear(u, v, w, a, b, c, d, e, f, g, h):
+    """Trilinear interpolation."""
+    a, c, e, g = a + u * (b - a), c + u * (d - c), e + u * (f - e), g + u * (h - g)
+    a, e = a + v * (c - a), e + v * (g - e)
+    return a + w * (e - a)
 
 
 @inlined
-def interpolate(n, up, down, row, words, lists):
-    """Trilinear interpolation of a field of the words that were brought, into a row of lists."""
+def byte_of(word, shift):
+    """A byte of a word, turned at 128. (Masked, so that SIMD stays in 32 bits.)"""
+    return np.float32(np.int32((word >> shift) & np.int32(255)))
+
+
+@inlined
+def interpolate_bytes(n, shift, row, words, lists):
+    """Trilinear interpolation of a byte with sign of the words that were brought, into a row of lists."""
     for i in range(n):
-        a, b = field(words[W0 + i], up, down), field(words[W1 + i], up, down)
-        c, d = field(words[W2 + i], up, down), field(words[W3 + i], up, down)
-        e, f = field(words[W4 + i], up, down), field(words[W5 + i], up, down)
-        g, h = field(words[W6 + i], up, down), field(words[W7 + i], up, down)
-        u, v, w = lists[PX + i], lists[PY + i], lists[PZ + i]
-        a, c, e, g = a + u * (b - a), c + u * (d - c), e + u * (f - e), g + u * (h - g)
-        a, e = a + v * (c - a), e + v * (g - e)
-        lists[row + i] = a + w * (e - a)
+        a, b = byte_of(words[W0 + i], shift), byte_of(words[W1 + i], shift)
+        c, d = byte_of(words[W2 + i], shift), byte_of(words[W3 + i], shift)
+        e, f = byte_of(words[W4 + i], shift), byte_of(words[W5 + i], shift)
+        g, h = byte_of(words[W6 + i], shift), byte_of(words[W7 + i], shift)
+        value = trilinear(lists[PX + i], lists[PY + i], lists[PZ + i], a, b, c, d, e, f, g, h)
+        lists[row + i] = value - np.float32(128.0)
+
+
+@inlined
+def interpolate_words(n, row, words, lists):
+    """Trilinear interpolation of the words that were brought, into a row of lists."""
+    for i in range(n):
+        a, b, c, d = words[W0 + i], words[W1 + i], words[W2 + i], words[W3 + i]
+        e, f, g, h = words[W4 + i], words[W5 + i], words[W6 + i], words[W7 + i]
+        a, b, c, d = np.float32(a), np.float32(b), np.float32(c), np.float32(d)
+        e, f, g, h = np.float32(e), np.float32(f), np.float32(g), np.float32(h)
+        lists[row + i] = trilinear(lists[PX + i], lists[PY + i], lists[PZ + i], a, b, c, d, e, f, g, h)
 
 
 @inlined
@@ -241,21 +263,21 @@ def sample_points(n, cut, y, depth, start, place, words, lists):
 
     start: index coordinates of X = 0 at this Y and depth (on_slice).
     """
-    m = cut.index
+    m = cut.from_eye
     locate(n, start, (m[0, 0], m[1, 0], m[2, 0]), cut.shape, place, lists)
     low, scale = np.float32(cut.low), np.float32(cut.scale)
     together = cut.channels > 0 and cut.scalars.itemsize == 1
     if not together:
         bring(n, cut.scalars, cut.shape, place, words)
-        interpolate(n, np.int32(0), np.int32(0), VALUE, words, lists)
+        interpolate_words(n, VALUE, words, lists)
     if cut.channels > 0:
         bring(n, cut.words, cut.shape, place, words)
-        interpolate(n, np.int32(24), np.int32(24), NX, words, lists)
-        interpolate(n, np.int32(16), np.int32(24), NY, words, lists)
-        interpolate(n, np.int32(8), np.int32(24), NZ, words, lists)
+        interpolate_bytes(n, np.int32(0), NX, words, lists)
+        interpolate_bytes(n, np.int32(8), NY, words, lists)
+        interpolate_bytes(n, np.int32(16), NZ, words, lists)
     if together:
-        interpolate(n, np.int32(0), np.int32(24), VALUE, words, lists)
-        low -= np.float32(128.0)  # bytes are stored with their sign turned
+        interpolate_bytes(n, np.int32(24), VALUE, words, lists)
+        low -= np.float32(128.0)
     for i in range(n):
         lists[VALUE + i] = (lists[VALUE + i] - low) * scale
     if cut.channels > 0:
@@ -269,7 +291,7 @@ def sample_slice(cut, row, slices, k, planes, into):
     depth = slices.first + k * slices.distance
     start, y = on_slice(cut, row, depth), row[1] + depth * row[0]
     values, place, lists = planes.values, planes.place, planes.lists
-    m = cut.index
+    m = cut.from_eye
     c = 0
     while c < runs:
         end, wanted = c + 1, planes.wanted[k, c]

@@ -105,10 +105,10 @@ def store_gradients(scalars, shape, sobel, matrix, steepest, first, last, words)
                     most = max(abs(a), abs(b), abs(c))
                     scale = max(127.0 * min(length / steepest, 1.0) / length, 1.0 / most)
                 k = (z * ny + y) * nx + x
-                p = np.int64(np.floor(a * scale + 0.5)) & 255
-                q = np.int64(np.floor(b * scale + 0.5)) & 255
-                r = np.int64(np.floor(c * scale + 0.5)) & 255
-                words[k] = np.int32((((np.int64(scalars[k]) & 255) ^ 128) << 24) | (r << 16) | (q << 8) | p)
+                p = np.int64(np.floor(a * scale + 0.5)) + 128  # bytes with sign are turned at 128
+                q = np.int64(np.floor(b * scale + 0.5)) + 128
+                r = np.int64(np.floor(c * scale + 0.5)) + 128
+                words[k] = np.int32(((np.int64(scalars[k]) & 255) << 24) | (r << 16) | (q << 8) | p)
 
 
 def prepare_field(volume: Volume, wide: bool) -> Field:

@@ -18,26 +18,24 @@ import numpy as np
 from .jit import inlined, kernel
 from .mesh_shade import exp2_fast, log2_fast
 from .volume_rays import (
-    B,
-    G,
-    HALF_WAY,
+    BACK,
+    BACK_LIGHT,
     END,
+    FRONT,
+    FRONT_LIGHT,
     LENGTH,
     ONE,
     OPTICAL,
     ORIGIN,
-    R,
     RAYS,
+    ROW,
     SHARE,
-    T,
     TURN,
     ZERO,
-    BACK,
-    BACK_LIGHT,
-    BLOCK_ROWS,
-    FRONT,
-    FRONT_LIGHT,
-    ROW,
+    B,
+    G,
+    R,
+    T,
     blend,
     block_bounds,
     classify,
@@ -46,7 +44,6 @@ from .volume_rays import (
     seen,
     share_of_slab,
 )
-from .volume_sample import SLABS
 
 LINE = 16384 + 80  # room for the positions of one phase, a constant so that rows are known not to overlap
 RED, GREEN, BLUE, ALPHA = (np.uint64(k * LINE) for k in range(4))
@@ -56,15 +53,15 @@ SLAB_ROWS = 4
 class Shared(NamedTuple):
     """Classified slabs of one chunk, one thread's memory.
 
-    begin: x of position 0; fine, phases: see above; count: positions of a phase, a multiple of 64; values
-    (SLABS · phases · 4 · LINE,) float32: colour times opacity, and opacity; shown (SLABS, count/64) uint8: groups of
-    64 positions in which something is seen, and 2 for those beside them, which are all zero.
+    begin: x of position 0; fine, phases: see above; length: positions of a phase, in whole blocks; values
+    (SLABS · phases · 4 · LINE,) float32: colour times opacity, and opacity; shown (SLABS, blocks) uint8: in which
+    blocks something is seen; the others are zero.
     """
 
     begin: float
     fine: int
     phases: int
-    count: int
+    length: int
     values: np.ndarray
     shown: np.ndarray
 
@@ -95,7 +92,7 @@ def classify_slabs(cut, camera, row, slices, first, last, table, material, light
     """Fill shared.values with slabs first … last, whose slices are in planes.values from 0 on."""
     far = slices.first + slices.slabs * slices.distance
     n = np.uint64(RAYS)
-    groups = shared.count // RAYS
+    groups = shared.length // RAYS
     base = np.uint64(0)
     material = (np.float32(material[0]), np.float32(material[1]), np.float32(material[2]))
     for g in range(groups):
@@ -147,8 +144,8 @@ def classify_slabs(cut, camera, row, slices, first, last, table, material, light
 
 @inlined
 def next_run(shared, k, j):
-    """The next stretch of shown positions of slab k from j on: (first, end); first = count when there is none."""
-    groups = shared.count // RAYS
+    """The next stretch of shown positions of slab k from j on: (first, end); first = length when there is none."""
+    groups = shared.length // RAYS
     g = j // RAYS
     while g < groups and shared.shown[k, g] == 0:
         g += 1
@@ -189,7 +186,7 @@ def blend_view(offset, width, camera, slices, first, last, shared, t, line):
         j = max(q, 0)
         while True:
             begin, end = next_run(shared, k - first, j)
-            begin, end = max(begin - 1, j), min(end, shared.count - 1)
+            begin, end = max(begin - 1, j), min(end, shared.length - 1)
             x0, x1 = begin - q, min(end - q, width)
             if x0 >= width or begin >= end:
                 break

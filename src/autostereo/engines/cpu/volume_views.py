@@ -9,8 +9,22 @@ import numpy as np
 from .jit import inlined, kernel
 from .volume_modes import NONE, march_iso, march_mip, resolve_iso, resolve_mip
 from .volume_rays import (
-    B, BLOCK_ROWS, END, G, HALF, HALF_WAY, LENGTH, ONE, OPAQUE, ORIGIN, R, RAYS, ROW, T, TURN, ZERO,
-    block_bounds, march, ray_stretch,
+    END,
+    HALF,
+    HALF_WAY,
+    LENGTH,
+    ONE,
+    OPAQUE,
+    ORIGIN,
+    RAYS,
+    TURN,
+    ZERO,
+    B,
+    G,
+    R,
+    T,
+    march,
+    ray_stretch,
 )  # fmt: skip
 from .volume_sample import SLABS, hide_runs, keep_alive, mark_runs, sample_slice
 from .volume_shared import ALPHA, BLUE, GREEN, LINE, RED, SLAB_ROWS, blend_view, classify_slabs, clear_line, even_out
@@ -127,7 +141,7 @@ def draw_rows(rows, cuts, camera, slices, ways, offsets, wants_depth, planes, ra
 
     cuts, ways, planes: of each volume; depth ends rays where it has a size, and takes part if wants_depth.
     """
-    views, height, width, _ = color.shape
+    views, _, width, _ = color.shape
     far = slices.first + slices.slabs * slices.distance
     opaque, n, base = depth.shape[0] > 0, np.uint64(RAYS), np.uint64(0)
     for r in range(rows[0], rows[1]):
@@ -189,7 +203,7 @@ def hide_behind_views(views, width, offsets, camera, cut, slices, k, last, plane
 @kernel
 def draw_shared_rows(rows, cut, camera, slices, ways, offsets, planes, shared, rays, packed, line, color):
     """Draw rows (first, end) of every view from slabs that they share, over color (V, H, W, 4)."""
-    views, height, width, _ = color.shape
+    views, _, width, _ = color.shape
     for r in range(rows[0], rows[1]):
         slope = (camera.centre_y - (r + 0.5)) / camera.fy - camera.offset_y / camera.focal
         row = (slope, camera.offset_y)
