@@ -241,9 +241,11 @@ def test_demo(cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("autostereo.cli.demo.TILE", (24, 32))
     assert cli("demo", "-o", "demo").status == 0
     made = files(folder / "demo")
-    assert {"index.html", "eye_left.png", "eye_right.png", "views.webp", "views.gif", "quilt_qs8x6a0.75.png"} <= made
-    assert {"panel_looking-glass-portrait.png", "panel_wavelength-selective.png", "panel_slanted.png"} <= made
+    assert {"index.html", "mesh_views.gif", "mesh_quilt_qs8x6a0.75.png", "mesh_panel_slanted.png"} <= made
+    assert {"volume_panel_wavelength-selective.png", "points_panel_wavelength-selective.png"} <= made
     page = (folder / "demo" / "index.html").read_text(encoding="utf-8")
     assert set(re.findall(r'src="([^"]+)"', page)) == made - {"index.html"}
-    left, right = (pixels(folder / "demo" / f"eye_{side}.png").astype(int) for side in ("left", "right"))
-    assert (left != right).any()
+    for scene in ("mesh", "volume", "points", "mixed"):
+        assert {f"{scene}_panel_looking-glass-portrait.png", f"{scene}_views.webp"} <= made
+        left, right = (pixels(folder / "demo" / f"{scene}_eye_{side}.png").astype(int) for side in ("left", "right"))
+        assert (left != right).any()
