@@ -15,8 +15,7 @@ from .mesh_shade import HALF, ONE, ZERO
 from .points_chord import cut, lens_of
 from .points_setup import DEPTH, INVERSE, MATERIAL, PARTS, REACH, ROW0, ROW1, A, X
 
-BEFORE, BEHIND, BLEND = 0, 1, 2
-STAGES = 3
+BEFORE, BEHIND, BLEND = 0, 1, 2  # stages, see draw_surfels
 TWO, WIDE = np.float32(2.0), np.float32(1e9)
 CLOSER = np.float32(1.0 - 1e-5)  # rounding brings a sample nearer by less than the rest
 

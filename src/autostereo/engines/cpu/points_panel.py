@@ -29,7 +29,7 @@ from .mesh_shade import (
     whole_steps,
 )
 from .panel_lines import BUCKET, LinePlan, make_lines, row_offsets
-from .points_block import BEFORE, BEHIND, BLEND, draw_surfels, middle_depth, swath
+from .points_block import BLEND, draw_surfels, middle_depth, swath
 from .points_chord import depth_of, is_small, light_at, shine_of, weight_of
 from .points_setup import BLUE, DEPTH, FRONT, GREEN, ND, NX, NY, REACH, RED, SMALL, A, B
 
@@ -283,10 +283,9 @@ def splat_panel(span, grid, splats, camera, panel, block, scratch, color, depth)
         materials, lights, own_eye = splats.materials, splats.lights, splats.own_eye
         place = Place(block, plan, first, plane, at, lens_offset, materials, lights, own_eye)
         bounds = (rows[0], rows[1], start, end, middle_depth(start, end, splats))
-        draw_surfels(draw_chord, is_hidden, place, BEFORE, bounds, splats, camera, scratch)
-        find_farthest(rows[1] - rows[0], plane, scratch.planes)
-        draw_surfels(draw_chord, is_hidden, place, BEHIND, bounds, splats, camera, scratch)
-        find_farthest(rows[1] - rows[0], plane, scratch.planes)
+        for stage in range(BLEND):
+            draw_surfels(draw_chord, is_hidden, place, stage, bounds, splats, camera, scratch)
+            find_farthest(rows[1] - rows[0], plane, scratch.planes)
         draw_surfels(draw_chord, is_hidden, place, BLEND, bounds, splats, camera, scratch)
         for r in range(rows[0], rows[1]):
             line = height - 1 - r if panel.flip_y else r

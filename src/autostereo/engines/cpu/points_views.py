@@ -15,7 +15,7 @@ import numpy as np
 
 from .jit import inlined, kernel
 from .mesh_shade import ALPHA, HALF, ONE, STRIDE, ZERO, quantize, whole_steps
-from .points_block import CLOSER, STAGES, TWO, draw_surfels, middle_depth, swath
+from .points_block import BLEND, CLOSER, TWO, draw_surfels, middle_depth, swath
 from .points_chord import depth_of, is_small, light_at, shine_of, weight_of
 from .points_setup import BLUE, DEPTH, FRONT, GREEN, ND, NX, NY, REACH, RED, SMALL, A, B
 
@@ -316,8 +316,8 @@ def splat_views(span, grid, splats, camera, offsets, scratch, color, depth):
             materials, lights, own_eye = splats.materials, splats.lights, splats.own_eye
             place = Place(offsets, view, count, low, high, np.int32(stride), lens_offset, materials, lights, own_eye)
             load_depths(rows, columns, count, stride, (height, width), view, depths, scratch.planes)
-            for stage in range(STAGES):
-                if stage > 0:
-                    find_farthest(rows[1] - rows[0], count, stride, scratch.planes)
+            for stage in range(BLEND):
                 draw_surfels(draw_chord, is_hidden, place, stage, bounds, splats, camera, scratch)
+                find_farthest(rows[1] - rows[0], count, stride, scratch.planes)
+            draw_surfels(draw_chord, is_hidden, place, BLEND, bounds, splats, camera, scratch)
             store_samples(rows, columns, count, stride, (height, width), view, scratch.planes, colors, depths)

@@ -40,7 +40,6 @@ from .volume_views import ISO, MIP, Ways, draw_rows, draw_shared_rows
 
 MODES = ("composite", "mip", "iso")  # in the order of volume_views
 FINE = (1 / 8, 1 / 3)  # of a voxel: least and greatest distance of samples on a slice
-MAX_PERIOD = 16  # pixels of a table's period, up to which its lines are drawn like views
 PER_PIXEL = 1.4  # distance of samples on a slice, in pixels of the nearest one
 FINE_VIEWS = 2  # positions of a shared slab per pixel
 MAX_PLANES = 2**20
@@ -282,25 +281,17 @@ def draw_volume_panel(
         made = [make_cut(prepared, index, draw, slices, shared, memory) for index in group]
         cuts, ways = tuple(cut for cut, _ in made), tuple(way for _, way in made)
         counts = [samples_of(prepared, index, camera, cut) for index, cut in zip(group, cuts, strict=True)]
-        period = plan.period if draw.viewmap.table is not None and plan.period <= MAX_PERIOD and not averaged else 0
-        pool = _panel_pool(
-            group, counts, [way.light[0] for way in ways], draw, slices, plan, period if shared else -1, memory
-        )
+        channels = [way.light[0] for way in ways]
+        pool = _panel_pool(group, (counts, channels), draw, slices, plan if shared else None, memory)
 
         def task(
-            first: int,
-            end: int,
-            cuts: Any = cuts,
-            ways: Any = ways,
-            pool: Any = pool,
-            shared: bool = shared,
-            period: int = period,
+            first: int, end: int, cuts: Any = cuts, ways: Any = ways, pool: Any = pool, shared: bool = shared
         ) -> None:
             with pool as (planes, slabs, scratch):
                 rows: Any = (first, end)
                 if shared:
                     one = (rows, cuts[0], numbers, slices, ways[0])
-                    draw_panel_rows(*one, panel, period, averaged, planes[0], slabs, scratch, color)
+                    draw_panel_rows(*one, panel, averaged, planes[0], slabs, scratch, color)
                 else:
                     all_of = (rows, cuts, numbers, slices, ways)
                     draw_panel_rays(*all_of, panel, opaque and depth.size > 0, planes, scratch, color, depth)
@@ -310,17 +301,15 @@ def draw_volume_panel(
 
 def _panel_pool(
     group: list[int],
-    counts: list[int],
-    channels: list[int],
+    sizes: tuple[list[int], list[int]],
     draw: Draw,
     slices: Slices,
-    plan: LinePlan,
-    period: int,
+    plan: LinePlan | None,
     memory: Memory,
 ) -> Any:
-    """Threads' memory for a panel; period: of lines, 0 where every sub-pixel is on its own, −1 without shared slabs."""
+    """Threads' memory for a panel; sizes = (samples, channels) of each volume's planes; plan: for shared slabs."""
     camera, width = draw.camera, draw.camera.width
-    blocks = 3 * -(-width // RAYS)
+    reach = np.zeros(0) if plan is None else np.array([plan.low, plan.high])
 
     def make() -> Any:
         scratch = (
@@ -328,12 +317,10 @@ def _panel_pool(
             np.zeros(width, np.float64),
             np.zeros(BLOCK_ROWS * ROW, np.float32),
             np.zeros(ROW, np.int32),
-            np.zeros(3 * max(period, 0) * SLAB_ROWS * LINE, np.float32),
-            np.zeros(PIXEL_ROWS * ROW * blocks if period == 0 else 0, np.float32),
+            np.zeros(0 if plan is None else PIXEL_ROWS * ROW * 3 * -(-width // RAYS), np.float32),
         )
-        reach = np.array([plan.low, plan.high])
-        slabs = new_shared(camera, slices, reach, 1, max(period, 1)) if period >= 0 else None
-        return tuple(new_planes(n, slices, c) for n, c in zip(counts, channels, strict=True)), slabs, scratch
+        slabs = None if plan is None else new_shared(camera, slices, reach, 1, 1)
+        return tuple(new_planes(n, slices, c) for n, c in zip(*sizes, strict=True)), slabs, scratch
 
-    key = (("volume panel", *group), *counts, *channels, period, width, slices, camera.fx, camera.focal)
-    return memory.pool((*key, plan.low, plan.high), make)
+    key = (("volume panel", *group), *sizes[0], *sizes[1], width, slices, camera.fx, camera.focal, reach.tobytes())
+    return memory.pool(key, make)

@@ -1,8 +1,6 @@
 """Volumes straight to an interlaced panel: every sub-pixel its own camera, no stack of views in between.
 
-Slabs are shared as in a stack of views. Where the mask is a table, sub-pixels one period apart see through the same
-camera: they are contiguous in slabs of as many phases, and one channel of them is blended like a view. Elsewhere
-every sub-pixel looks up its own two neighbours.
+Slabs are shared as in a stack of views, one position a pixel; every sub-pixel looks up its own two neighbours.
 """
 
 from __future__ import annotations
@@ -13,57 +11,12 @@ from .jit import inlined, kernel
 from .panel_lines import row_offsets
 from .volume_rays import END, HALF, LENGTH, ONE, ORIGIN, RAYS, ROW, TURN, ZERO, B, G, R, T
 from .volume_sample import SLABS, hide_runs, keep_alive, mark_runs
-from .volume_shared import ALPHA, LINE, RED, SLAB_ROWS, classify_slabs, next_run, shift_of
+from .volume_shared import ALPHA, LINE, SLAB_ROWS, classify_slabs, shift_of
 from .volume_views import HIDDEN, mark_volumes, next_slices, over, trace_rays
 
 AT, MOVE, SHARE_R, CUT_R, A0, A1, C0, C1, SUM, THROUGH = (np.uint64(k * ROW) for k in range(10))
 PIXEL_ROWS = 10
 THIRD = np.float32(1.0 / 3.0)
-
-
-@inlined
-def blend_channel(n, near, beside, part, channel, t, values, line):
-    """Add one channel of n positions of a slab to a line's sums; see volume_shared.blend_run."""
-    for i in range(n):
-        c, a = values[near + channel + i], values[near + ALPHA + i]
-        c += part * (values[beside + channel + i] - c)
-        a += part * (values[beside + ALPHA + i] - a)
-        through = line[t + ALPHA + i]
-        line[t + RED + i] += through * c
-        line[t + ALPHA + i] = through - through * a
-
-
-@kernel
-def blend_line(x, offset, count, channel, camera, slices, first, last, shared, t, line):
-    """Add slabs first … last to one channel of the pixels x + i·phases, i < count, of a camera offset."""
-    phases, row = shared.phases, np.uint64(channel) * np.uint64(LINE)
-    for k in range(first, last):
-        at = (x - offset * shift_of(camera, slices, k) - shared.begin) * shared.fine
-        m = np.int64(np.floor(at))
-        part = np.float32(at - m)
-        q, phase = m // phases, m % phases
-        slab = (k - first) * phases
-        near = (slab + phase) * SLAB_ROWS * LINE
-        beside = (slab + phase + 1) * SLAB_ROWS * LINE if phase + 1 < phases else slab * SLAB_ROWS * LINE + 1
-        j = max(q, 0)
-        while True:
-            begin, end = next_run(shared, k - first, j)
-            begin, end = max(begin - 1, j), min(end, shared.length - 1)
-            i0, i1 = begin - q, min(end - q, count)
-            if i0 >= count or begin >= end:
-                break
-            if i1 > i0:
-                blend_channel(
-                    np.uint64(i1 - i0),
-                    np.uint64(near + begin),
-                    np.uint64(beside + begin),
-                    part,
-                    row,
-                    np.uint64(t + i0),
-                    shared.values,
-                    line,
-                )
-            j = end
 
 
 @inlined
@@ -139,7 +92,7 @@ def place_in_pixel(subpixel, c):
 
 
 @kernel
-def hide_behind_panel(width, period, offsets, camera, cut, slices, k, last, planes, line, pixels):
+def hide_behind_panel(width, offsets, camera, cut, slices, k, last, planes, pixels):
     """Leave out what all sub-pixels have seen enough before, in the slices of slabs k … last."""
     near, far = slices.first + k * slices.distance, slices.first + last * slices.distance
     planes.alive[:] = np.uint8(0)
@@ -147,10 +100,7 @@ def hide_behind_panel(width, period, offsets, camera, cut, slices, k, last, plan
         for x in range(0, width, RAYS):
             low, high, dark = np.float32(np.inf), np.float32(-np.inf), True
             for i in range(x, min(x + RAYS, width)):
-                if period > 0:
-                    through = line[np.uint64(((i % period) * 3 + c) * SLAB_ROWS * LINE + i // period) + ALPHA]
-                else:
-                    through = pixels[np.uint64((3 * (i // RAYS) + c) * PIXEL_ROWS * ROW + i % RAYS) + THROUGH]
+                through = pixels[np.uint64((3 * (i // RAYS) + c) * PIXEL_ROWS * ROW + i % RAYS) + THROUGH]
                 if through >= HIDDEN:
                     o = offsets[c * width + i]
                     low, high, dark = min(low, o), max(high, o), False
@@ -170,13 +120,12 @@ def keep_between(x, low, high, near, far, camera, cut, alive):
 
 
 @kernel
-def draw_panel_rows(rows, cut, camera, slices, ways, panel, period, averaged, planes, shared, scratch, color):
+def draw_panel_rows(rows, cut, camera, slices, ways, panel, averaged, planes, shared, scratch, color):
     """Draw rows (first, end) of the picture from shared slabs over the panel color (H, W, 3).
 
-    period: that of the table in pixels, or 0; scratch = (offsets (3·W,) float32, u (W,) float64, rays, index, line,
-    pixels).
+    scratch = (offsets (3·W,) float32, u (W,) float64, rays, index, pixels).
     """
-    offsets, u, rays, index, line, pixels = scratch
+    offsets, u, rays, index, pixels = scratch
     height, width, _ = color.shape
     blocks = -(-width // RAYS)
     stride = PIXEL_ROWS * ROW
@@ -187,44 +136,27 @@ def draw_panel_rows(rows, cut, camera, slices, ways, panel, period, averaged, pl
             continue
         shown = height - 1 - r if panel.flip_y else r
         row_offsets(shown, width, panel.flip_x, (0, width), 0, 0, width, panel.plan, u, offsets)
-        if period > 0:
-            for t in range(3 * period):
-                for i in range(-(-width // period)):
-                    line[np.uint64(t * SLAB_ROWS * LINE + i) + RED] = ZERO
-                    line[np.uint64(t * SLAB_ROWS * LINE + i) + ALPHA] = ONE
-        else:
-            for b in range(3 * blocks):
-                base, c = np.uint64(b * stride), b % 3
-                for i in range(RAYS):
-                    x = min((b // 3) * RAYS + i, width - 1)
-                    k = np.uint64(i)
-                    pixels[base + AT + k] = np.float32(x + place_in_pixel(panel.subpixel, c) - shared.begin)
-                    pixels[base + MOVE + k] = offsets[c * width + x]
-                    pixels[base + SUM + k] = ZERO
-                    pixels[base + THROUGH + k] = ONE
+        for b in range(3 * blocks):
+            base, c = np.uint64(b * stride), b % 3
+            for i in range(RAYS):
+                x = min((b // 3) * RAYS + i, width - 1)
+                k = np.uint64(i)
+                pixels[base + AT + k] = np.float32(x + place_in_pixel(panel.subpixel, c) - shared.begin)
+                pixels[base + MOVE + k] = offsets[c * width + x]
+                pixels[base + SUM + k] = ZERO
+                pixels[base + THROUGH + k] = ONE
         for k in range(0, slices.slabs, SLABS):
             last = min(k + SLABS, slices.slabs)
             if k > 0:
-                hide_behind_panel(width, period, offsets, camera, cut, slices, k, last, planes, line, pixels)
+                hide_behind_panel(width, offsets, camera, cut, slices, k, last, planes, pixels)
             next_slices(cut, row, slices, k, last, planes)
             args = (ways.table, ways.material, ways.light, planes, shared, rays, index)
             classify_slabs(cut, camera, row, slices, k, last, *args)
-            if period == 0:
-                blend_pixels(blocks, averaged, camera, slices, k, last, shared, pixels, index)
-            for t in range(3 * period):
-                x, c = t // 3, t % 3
-                count = -(-(width - x) // period) if x < width else 0
-                offset = np.float64(offsets[c * width + x]) if x < width else 0.0
-                at = x + place_in_pixel(panel.subpixel, c)
-                blend_line(at, offset, count, c, camera, slices, k, last, shared, t * SLAB_ROWS * LINE, line)
+            blend_pixels(blocks, averaged, camera, slices, k, last, shared, pixels, index)
         for c in range(3):
             for x in range(width):
-                if period > 0:
-                    k = np.uint64(((x % period) * 3 + c) * SLAB_ROWS * LINE + x // period)
-                    total, through = line[k + RED], line[k + ALPHA]
-                else:
-                    k = np.uint64((3 * (x // RAYS) + c) * stride + x % RAYS)
-                    total, through = pixels[k + SUM], pixels[k + THROUGH]
+                k = np.uint64((3 * (x // RAYS) + c) * stride + x % RAYS)
+                total, through = pixels[k + SUM], pixels[k + THROUGH]
                 if through < ONE:
                     at = x + place_in_pixel(panel.subpixel, c)
                     total, through = even_sub_pixel(at, offsets[c * width + x], middle, camera, row, total, through)
@@ -248,7 +180,7 @@ def draw_panel_rays(rows, cuts, camera, slices, ways, panel, wants_depth, planes
 
     cuts, ways, planes, depth (H, W, 3): see volume_views.draw_rows.
     """
-    offsets, u, rays, index, _, _ = scratch
+    offsets, u, rays, index, _ = scratch
     height, width, _ = color.shape
     far = slices.first + slices.slabs * slices.distance
     opaque = depth.shape[0] > 0
