@@ -169,6 +169,29 @@ def test_quilts_are_woven_to_panels(display):
     assert (panel(aus.Scene(square), display, "n-pass-subres") == 255).all()
 
 
+def cloud(seed: int) -> aus.Points:
+    """Surfels of all sizes, some edge-on, some around and behind the cameras, a huge one."""
+    rng = np.random.default_rng(seed)
+    positions = rng.normal((0, 0, 0.5), (0.9, 0.6, 1.5), (24, 3))
+    normals = rng.normal(size=(24, 3)) * (1, 1, 0.3)
+    radii = np.append(np.exp(rng.uniform(-6, 0, 23)), 1e4)
+    return aus.Points(positions, normals, radii, rng.random((24, 3)), material=aus.Material(specular=0.5))
+
+
+@pytest.mark.parametrize("name", ["slanted", "slanted, mirrored", "lenticular", "coarse lenses", "cells"])
+def test_single_pass_is_n_passes_for_points_among_meshes(name):
+    for objects in (cloud(1), [cloud(2), *SCENES["plain"].objects]):
+        assert_one_pass_is_many(aus.Scene(objects, LIGHTS), DISPLAYS[name])
+
+
+def test_points_are_those_of_the_reference():
+    content = aus.Scene(cloud(3), LIGHTS)
+    found, expected = (views(content, engine=e, depth=True) for e in ("cpu", "reference"))
+    assert (np.abs(found.color.astype(int) - expected.color) > 1).any(axis=-1).mean() < 5e-3
+    found, expected = (panel(content, CONTINUOUS, engine=e, sampling="subpixel") for e in ("cpu", "reference"))
+    assert (np.abs(found.astype(int) - expected) > 1).mean() < 5e-3
+
+
 @pytest.mark.parametrize("flips", [(False, False), (True, True)])
 @pytest.mark.parametrize("display", [*DISPLAYS.values(), CONTINUOUS], ids=lambda d: d.name)
 def test_gathering_is_that_of_the_reference(display, flips):
