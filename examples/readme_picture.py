@@ -7,11 +7,11 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 import autostereo as aus
-from autostereo.scene.shapes import demo_scene
+from autostereo.cli.demo import mixed_scene
 
 display = aus.Display.preset("looking-glass-portrait")
 rig = aus.Rig(position=(0.05, 1.3, 9.3), target=(0.05, 0.15, -0.3), fov_y=43, baseline=4)
-panel = aus.render(demo_scene(), display, rig)
+panel = aus.render(mixed_scene(), display, rig)
 left, right = (aus.observe(panel, display, eye=(x, 500)) for x in (-31.5, 31.5))  # mm from the panel's centre
 
 tile = (240, 320)
