@@ -44,14 +44,14 @@ def _version(asked: bool) -> None:
 @app.callback(
     epilog="\b\nExamples:\n"
     "  autostereo render bunny.ply --display looking-glass-portrait\n"
-    "  autostereo quilt bunny.ply --display looking-glass-portrait\n"
+    "  autostereo quilt head.nii.gz --display looking-glass-portrait --transfer ct-bone\n"
     "  autostereo displays\n"
     "  autostereo render --help"
 )
 def _root(
     version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print it.")] = False,
 ) -> None:
-    """Render 3D scenes for glasses-free 3D displays: all views in one pass, on a plain CPU."""
+    """Render meshes, volumes and point clouds for glasses-free 3D displays: all views in one pass, on a plain CPU."""
 
 
 for _verb in VERBS:  # the examples of a docstring keep their lines; the rest of it is wrapped
