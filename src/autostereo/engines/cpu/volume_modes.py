@@ -7,6 +7,7 @@ import numpy as np
 from .jit import inlined, kernel
 from .volume_rays import (
     BACK,
+    ENTER,
     FRONT,
     FRONT_LIGHT,
     HALF,
@@ -32,8 +33,50 @@ NONE = np.float32(-1.0)
 
 
 @inlined
+def scalar_at(cut, x, y, z):
+    """Scalar at index coordinates, as a row of the table."""
+    nx, ny, nz = cut.shape[0], cut.shape[1], cut.shape[2]
+    x, y, z = min(max(x, 0.0), nx - 1.0), min(max(y, 0.0), ny - 1.0), min(max(z, 0.0), nz - 1.0)
+    i, j, k = min(int(x), nx - 2), min(int(y), ny - 2), min(int(z), nz - 2)
+    u, v, w = x - i, y - j, z - k
+    s, p = cut.scalars, (k * ny + j) * nx + i
+    q = p + nx * ny
+    a = s[p] + u * (np.float64(s[p + 1]) - s[p])
+    b = s[p + nx] + u * (np.float64(s[p + nx + 1]) - s[p + nx])
+    c = s[q] + u * (np.float64(s[q + 1]) - s[q])
+    d = s[q + nx] + u * (np.float64(s[q + nx + 1]) - s[q + nx])
+    a, c = a + v * (b - a), c + v * (d - c)
+    return (a + w * (c - a) - cut.low) * cut.scale
+
+
+@inlined
+def index_at(cut, row, x, depth):
+    """Index coordinates of the point at X and depth of a row's plane."""
+    m, y = cut.from_eye, row[1] + depth * row[0]
+    return (
+        m[0, 0] * x + m[0, 1] * y + m[0, 2] * depth + m[0, 3],
+        m[1, 0] * x + m[1, 1] * y + m[1, 2] * depth + m[1, 3],
+        m[2, 0] * x + m[2, 1] * y + m[2, 2] * depth + m[2, 3],
+    )
+
+
+@inlined
+def scalar_on_ray(cut, row, ray, depth, rays):
+    """Scalar at a depth of one ray, as a row of the table."""
+    d = np.float64(depth)
+    x, y, z = index_at(cut, row, rays[ray + ORIGIN] + d * rays[ray + TURN], d)
+    return np.float32(scalar_at(cut, x, y, z))
+
+
+@inlined
+def slab_ends(ray, depth, distance, rays):
+    """Depths between which a ray is in a volume within the slab from `depth` on."""
+    return max(np.float32(depth), rays[ray + ENTER]), min(np.float32(depth + distance), rays[ray + LEAVE])
+
+
+@inlined
 def sample_ends(n, base, k, fresh, cut, row, slices, planes, rays):
-    """Scalars at both ends of slab k into FRONT and BACK."""
+    """Scalars at both ends of slab k into FRONT and BACK; a ray that enters or leaves within it has its ends there."""
     depth = slices.first + k * slices.distance
     if fresh:
         for i in range(n):
@@ -42,6 +85,14 @@ def sample_ends(n, base, k, fresh, cut, row, slices, planes, rays):
         sample_volume(n, base, depth, cut, row, False, planes, FRONT, FRONT_LIGHT, rays)
     sample_volume(n, base, depth + slices.distance, cut, row, False, planes, BACK, FRONT_LIGHT, rays)
     share_of_slab(n, base, depth, slices.distance, rays)
+    near, far = np.float32(depth), np.float32(depth + slices.distance)
+    for i in range(n):
+        if rays[base + SHARE + i] > ZERO:
+            enter, leave = rays[base + ENTER + i], rays[base + LEAVE + i]
+            if enter > near:
+                rays[base + FRONT + i] = scalar_on_ray(cut, row, base + i, enter, rays)
+            if leave < far:
+                rays[base + BACK + i] = scalar_on_ray(cut, row, base + i, leave, rays)
 
 
 @kernel
@@ -56,9 +107,9 @@ def march_mip(n, base, cut, row, slices, first, last, planes, rays):
             fresh = False
             continue
         sample_ends(n, base, k, fresh, cut, row, slices, planes, rays)
-        near, far = np.float32(depth), np.float32(depth + slices.distance)
         for i in range(n):
             front, back = rays[base + FRONT + i], rays[base + BACK + i]
+            near, far = slab_ends(base + i, depth, slices.distance, rays)
             most, inside = rays[base + R + i], rays[base + SHARE + i] > ZERO
             rays[base + HALF + i] = near if inside & (front > most) else rays[base + HALF + i]
             most = max(most, front) if inside else most
@@ -100,32 +151,14 @@ def march_iso(n, base, cut, row, slices, first, last, level, planes, rays):
             fresh = False
             continue
         sample_ends(n, base, k, fresh, cut, row, slices, planes, rays)
-        near, distance = np.float32(depth), np.float32(slices.distance)
         for i in range(n):
             front, back = rays[base + FRONT + i] - iso, rays[base + BACK + i] - iso
-            part = front / (front - back if front != back else ONE)
-            at = near + part * distance
-            crosses = (front * back <= ZERO) & (front != back) & (rays[base + SHARE + i] > ZERO)
-            crosses = crosses & (at <= rays[base + LEAVE + i]) & (rays[base + HALF + i] > at)
+            near, far = slab_ends(base + i, depth, slices.distance, rays)
+            at = near + front / (front - back if front != back else ONE) * (far - near)
+            crosses = ((front >= ZERO) != (back >= ZERO)) & (rays[base + SHARE + i] > ZERO)
+            crosses = crosses & (rays[base + HALF + i] > at)
             rays[base + HALF + i] = at if crosses else rays[base + HALF + i]
         fresh = True
-
-
-@inlined
-def scalar_at(cut, x, y, z):
-    """Scalar at index coordinates, as a row of the table."""
-    nx, ny, nz = cut.shape[0], cut.shape[1], cut.shape[2]
-    x, y, z = min(max(x, 0.0), nx - 1.0), min(max(y, 0.0), ny - 1.0), min(max(z, 0.0), nz - 1.0)
-    i, j, k = min(int(x), nx - 2), min(int(y), ny - 2), min(int(z), nz - 2)
-    u, v, w = x - i, y - j, z - k
-    s, p = cut.scalars, (k * ny + j) * nx + i
-    q = p + nx * ny
-    a = s[p] + u * (np.float64(s[p + 1]) - s[p])
-    b = s[p + nx] + u * (np.float64(s[p + nx + 1]) - s[p + nx])
-    c = s[q] + u * (np.float64(s[q + 1]) - s[q])
-    d = s[q + nx] + u * (np.float64(s[q + nx + 1]) - s[q + nx])
-    a, c = a + v * (b - a), c + v * (d - c)
-    return (a + w * (c - a) - cut.low) * cut.scale
 
 
 @inlined
@@ -142,20 +175,9 @@ def slope_at(cut, x, y, z, axis):
 
 
 @inlined
-def index_at(cut, row, x, depth):
-    """Index coordinates of the point at X and depth of a row's plane."""
-    m, y = cut.from_eye, row[1] + depth * row[0]
-    return (
-        m[0, 0] * x + m[0, 1] * y + m[0, 2] * depth + m[0, 3],
-        m[1, 0] * x + m[1, 1] * y + m[1, 2] * depth + m[1, 3],
-        m[2, 0] * x + m[2, 1] * y + m[2, 2] * depth + m[2, 3],
-    )
-
-
-@inlined
-def refine_hit(cut, row, origin, turn, depth, distance, level):
-    """Depth near `depth` where a ray crosses the level of the volume itself, by regula falsi (Illinois)."""
-    a, b = depth - 0.6 * distance, depth + 0.6 * distance
+def refine_hit(cut, row, origin, turn, depth, near, far, level):
+    """Depth between near and far, about `depth`, where a ray crosses the level, by regula falsi (Illinois)."""
+    a, b = near, far
     p, q, r = index_at(cut, row, origin + a * turn, a)
     fa = scalar_at(cut, p, q, r) - level
     p, q, r = index_at(cut, row, origin + b * turn, b)
@@ -190,7 +212,10 @@ def resolve_iso(n, base, cut, row, slices, level, color, material, shade, own_ey
         if not rays[ray + HALF] < np.float32(1e30):
             continue
         origin, turn = np.float64(rays[ray + ORIGIN]), np.float64(rays[ray + TURN])
-        depth = refine_hit(cut, row, origin, turn, np.float64(rays[ray + HALF]), slices.distance, level)
+        depth = np.float64(rays[ray + HALF])
+        k = np.floor((depth - slices.first) / slices.distance)
+        near, far = slab_ends(ray, slices.first + k * slices.distance, slices.distance, rays)
+        depth = refine_hit(cut, row, origin, turn, depth, np.float64(near), np.float64(far), level)
         x, y = origin + depth * turn, row[1] + depth * row[0]
         red, green, blue = color[0], color[1], color[2]
         if shade:

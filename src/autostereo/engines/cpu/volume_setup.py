@@ -124,7 +124,7 @@ def prepare_field(volume: Volume, wide: bool) -> Field:
         first_value = low if values.dtype.kind == "i" else 0.0
         target = np.uint8 if values.dtype.itemsize == 1 and not wide else np.uint16
         scalars = np.empty(values.size, target)
-        np.subtract(values.reshape(-1), int(first_value), out=scalars, casting="unsafe")
+        np.subtract(values.reshape(-1), int(first_value), out=scalars, dtype=np.int32, casting="unsafe")
     else:
         first_value, value_step = low, max(high - low, 1e-300) / 65535.0
         scalars = np.empty(values.size, np.uint16)
@@ -188,6 +188,8 @@ def shown_blocks(field: Field, reach: int) -> NDArray[np.uint8]:
         total = np.concatenate([[0], np.cumsum(sides[0] | sides[1])])
         first = np.maximum(np.searchsorted(values, ranges[0], "right") - 1, 0)
         last = np.minimum(np.searchsorted(values, ranges[1], "left") + 1, len(values))
+        if volume.mode == "mip":  # what shows nothing but is greater than what does hides it
+            first[...] = 0
         shown = total[last] > total[first]
     for axis in range(3):
         padded = np.pad(shown, [(reach, reach) if a == axis else (0, 0) for a in range(3)])
