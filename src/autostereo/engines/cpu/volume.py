@@ -35,13 +35,14 @@ from .volume_setup import (
     prepare_field,
     shown_blocks,
 )
-from .volume_shared import LINE, SLAB_ROWS, Shared
+from .volume_shared import LINE, MAX_LENGTH, SLAB_ROWS, Shared
 from .volume_views import ISO, MIP, Ways, draw_rows, draw_shared_rows
 
 MODES = ("composite", "mip", "iso")  # in the order of volume_views
 FINE = (1 / 8, 1 / 3)  # of a voxel: least and greatest distance of samples on a slice
 PER_PIXEL = 1.4  # distance of samples on a slice, in pixels of the nearest one
 FINE_VIEWS = 2  # positions of a shared slab per pixel
+STEEPEST = 1.0  # greatest offset of a camera over the nearest depth, up to which views may share slabs
 MAX_PLANES = 2**20
 
 
@@ -183,6 +184,23 @@ def is_shared(prepared: PreparedVolumes, group: list[int], options: Options) -> 
     return alone and (options.volume == "shared" or options.alpha == "averaged")
 
 
+def shared_reach(
+    camera: Camera, slices: Slices, offsets: NDArray[np.float64], fine: int, phases: int
+) -> tuple[float, int]:
+    """Where shared slabs begin, in pixels, and their positions of a phase, so that they reach as far as views see."""
+    ends = np.array([slices.first, slices.first + slices.slabs * slices.distance])
+    shifts = np.outer(offsets, camera.fx / camera.focal - camera.fx / ends)
+    begin = float(np.floor(-shifts.max())) - 2.0
+    positions = (camera.width - float(shifts.min()) + 2.0 - begin) * fine
+    return begin, -(-int(np.ceil(positions / phases) + 2) // RAYS) * RAYS
+
+
+def can_share(camera: Camera, slices: Slices, offsets: NDArray[np.float64]) -> bool:
+    """Whether slabs may be shared: not by cameras amid the volume, which see a slab from all sides."""
+    flat = float(np.abs(offsets).max()) <= STEEPEST * slices.first
+    return flat and shared_reach(camera, slices, offsets, 1, 1)[1] <= MAX_LENGTH
+
+
 def draw_volume_views(
     prepared: PreparedVolumes,
     opaque: bool,
@@ -199,8 +217,12 @@ def draw_volume_views(
     numbers = camera_numbers(camera)
     views, height, _, _ = color.shape
     wants_depth = depth.size > 0 and (opaque or options.depth)
-    for group in volume_groups(prepared, opaque):
-        shared = is_shared(prepared, group, options) and views > 1 and depth.size == 0
+    may_share = views > 1 and depth.size == 0 and can_share(camera, slices, draw.offsets)
+    groups = volume_groups(prepared, opaque)
+    apart = wants_depth and not opaque and len(groups) > 1  # what is translucent ends no rays
+    ends = depth.copy() if apart else depth
+    for group in groups:
+        shared = may_share and is_shared(prepared, group, options)
         made = [make_cut(prepared, index, draw, slices, shared, memory) for index in group]
         cuts, ways = tuple(cut for cut, _ in made), tuple(way for _, way in made)
         counts = [samples_of(prepared, index, camera, cut) for index, cut in zip(group, cuts, strict=True)]
@@ -213,21 +235,23 @@ def draw_volume_views(
             partial(new_rays, counts, channels, slices),
         )
 
-        def task(first: int, end: int, cuts: Any = cuts, ways: Any = ways, pool: Any = pool) -> None:
+        nearest = ends.copy() if apart else depth
+
+        def task(
+            first: int, end: int, cuts: Any = cuts, ways: Any = ways, pool: Any = pool, nearest: Any = nearest
+        ) -> None:
             with pool as (planes, rays, packed):
                 args = (ways, draw.offsets, wants_depth, planes, rays, packed)
-                draw_rows((first, end), cuts, numbers, slices, *args, color, depth)
+                draw_rows((first, end), cuts, numbers, slices, *args, color, nearest)
 
         run_rows(height, task)
+        if apart:
+            np.minimum(depth, nearest, out=depth)
 
 
 def new_shared(camera: Camera, slices: Slices, offsets: NDArray[np.float64], fine: int, phases: int) -> Shared:
     """One thread's memory for shared slabs that reach as far as the views see."""
-    ends = np.array([slices.first, slices.first + slices.slabs * slices.distance])
-    shifts = np.outer(offsets, camera.fx / camera.focal - camera.fx / ends)
-    begin = float(np.floor(-shifts.max())) - 2.0
-    positions = (camera.width - float(shifts.min()) + 2.0 - begin) * fine
-    count = -(-int(np.ceil(positions / phases) + 2) // RAYS) * RAYS
+    begin, count = shared_reach(camera, slices, offsets, fine, phases)
     values = np.zeros(SLABS * phases * SLAB_ROWS * LINE, np.float32)
     return Shared(begin, fine, phases, count, values, np.zeros((SLABS, count // RAYS), np.uint8))
 
@@ -276,8 +300,9 @@ def draw_volume_panel(
     panel = Panel(plan, draw.flip_x, draw.flip_y, options.sampling == "subpixel")
     averaged = options.alpha == "averaged"
     numbers = camera_numbers(camera)
+    may_share = depth.size == 0 and can_share(camera, slices, np.array([plan.low, plan.high]))
     for group in volume_groups(prepared, opaque):
-        shared = is_shared(prepared, group, options) and (averaged or depth.size == 0)
+        shared = may_share and is_shared(prepared, group, options)
         made = [make_cut(prepared, index, draw, slices, shared, memory) for index in group]
         cuts, ways = tuple(cut for cut, _ in made), tuple(way for _, way in made)
         counts = [samples_of(prepared, index, camera, cut) for index, cut in zip(group, cuts, strict=True)]

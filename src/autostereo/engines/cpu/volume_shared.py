@@ -45,7 +45,8 @@ from .volume_rays import (
     share_of_slab,
 )
 
-LINE = 16384 + 80  # room for the positions of one phase, a constant so that rows are known not to overlap
+MAX_LENGTH = 16384  # positions of a phase
+LINE = MAX_LENGTH + 80  # room for the positions of one phase, a constant so that rows are known not to overlap
 RED, GREEN, BLUE, ALPHA = (np.uint64(k * LINE) for k in range(4))
 SLAB_ROWS = 4
 
