@@ -90,14 +90,14 @@ def volume_scene() -> Scene:
     """A machine part as computed tomography shows it."""
     from ..scene.samples import engine_part
 
-    return _alone(engine_part(), 2.1, 40)
+    return _alone(engine_part(), 1.75, 40)
 
 
 def points_scene() -> Scene:
     """A scanned rock of 200,000 surfels."""
     from ..scene.samples import surfel_cloud
 
-    return _alone(surfel_cloud(), 2.2, 20)
+    return _alone(surfel_cloud(), 1.9, 20)
 
 
 def mixed_scene() -> Scene:
@@ -123,7 +123,7 @@ def _alone(item: Any, size: float, turn: float) -> Scene:
     from ..scene.shapes import demo_scene
     from ..transforms import rotation, scaling, translation
 
-    place = translation(0.05, 0.1, -0.3) @ rotation((1, 0, 0), 17) @ rotation((0, 1, 0), turn) @ scaling(size)
+    place = translation(0.05, 0.2, -0.3) @ rotation((1, 0, 0), 17) @ rotation((0, 1, 0), turn) @ scaling(size)
     return replace(demo_scene(), objects=(replace(item, transform=place),))
 
 
