@@ -41,7 +41,7 @@ from .volume_views import ISO, MIP, Ways, draw_rows, draw_shared_rows
 MODES = ("composite", "mip", "iso")  # in the order of volume_views
 FINE = (1 / 8, 1 / 3)  # of a voxel: least and greatest distance of samples on a slice
 PER_PIXEL = 1.4  # distance of samples on a slice, in pixels of the nearest one
-FINE_VIEWS = 2  # positions of a shared slab per pixel
+FINE_VIEWS = (2, 8, 4)  # positions of a shared slab: least and most per pixel, and per voxel between them
 STEEPEST = 1.0  # greatest offset of a camera over the nearest depth, up to which views may share slabs
 MAX_PLANES = 2**20
 
@@ -76,6 +76,17 @@ def make_slices(volumes: list[Volume], camera: Camera, step: float) -> Slices | 
     return Slices(first, (last - first) / slabs, slabs)
 
 
+def table_range(volume: Volume) -> tuple[float, float]:
+    """Scalars between which a volume is classified; beyond the ends of a transfer function nothing changes."""
+    low, high = volume.value_range
+    points = volume.transfer.points[:, 0]
+    if volume.mode != "composite":
+        return low, high
+    margin = 0.5 * float(points[-1] - points[0])  # for slabs that lead beyond an end
+    first, last = max(low, float(points[0]) - margin), min(high, float(points[-1]) + margin)
+    return (first, last) if first < last else (low, high)
+
+
 def make_cut(
     prepared: PreparedVolumes, index: int, draw: Draw, slices: Slices, shared: bool, memory: Memory
 ) -> tuple[Cut, Ways]:
@@ -90,12 +101,13 @@ def make_cut(
     first = float(x.min()) - 2.0 * step
     reach = int(np.ceil((8 * step * along + 1 + slices.distance * np.abs(index_from_eye[:3, 2]).max()) / (1 << BLOCK)))
     shown = memory.remember(("shown", index), (reach, volume), lambda: shown_blocks(f, reach))
-    low, high = f.grid.low, f.grid.high
+    low, high = table_range(volume)
     table = memory.remember(
         ("table", index),
         (volume, slices.distance),
-        lambda: make_table(volume.transfer, *volume.value_range, slices.distance),
+        lambda: make_table(volume.transfer, low, high, slices.distance),
     )
+    low, high = (low - f.first_value) / f.value_step, (high - f.first_value) / f.value_step
     lights, m = light_array(prepared.scene, camera), volume.material
     channels, light_colors = 0, 0
     if f.grid.words.size:
@@ -261,12 +273,24 @@ def _draw_shared(
 ) -> None:
     camera, offsets = draw.camera, draw.offsets
     numbers = camera_numbers(camera)
-    key = ("volume shared", samples, slices, ways.light[0], camera.width, camera.fx, camera.focal, offsets.tobytes())
+    pixel = slices.first / camera.fx * float(np.abs(cut.from_eye[:, 0]).max())  # of the nearest one, in voxels
+    fine = int(np.clip(np.ceil(FINE_VIEWS[2] * pixel), FINE_VIEWS[0], FINE_VIEWS[1]))
+    key = (
+        "volume shared",
+        fine,
+        samples,
+        slices,
+        ways.light[0],
+        camera.width,
+        camera.fx,
+        camera.focal,
+        offsets.tobytes(),
+    )
     pool = memory.pool(
         key,
         lambda: (
             new_planes(samples, slices, ways.light[0]),
-            new_shared(camera, slices, offsets, FINE_VIEWS, FINE_VIEWS),
+            new_shared(camera, slices, offsets, fine, fine),
             np.zeros(BLOCK_ROWS * ROW, np.float32),
             np.zeros(ROW, np.int32),
             np.zeros(len(offsets) * SLAB_ROWS * LINE, np.float32),

@@ -14,7 +14,7 @@ import numpy as np
 
 from .jit import inlined, kernel
 from .mesh_shade import exp2_fast, log2_fast
-from .volume_setup import BLOCK
+from .volume_setup import BLOCK, TABLE
 
 CHUNK = 4  # log2 of samples in a run
 SLABS = 16  # slabs between slices that are handled together
@@ -23,6 +23,7 @@ AT_ONCE = 256
 AT, EYE, PX, PY, PZ, VALUE, NX, NY, NZ, DIFFUSE, SHINE, LIGHT = (np.uint64(k * LIST) for k in range(12))
 LIST_ROWS = 18
 W0, W1, W2, W3, W4, W5, W6, W7 = (np.uint64(k * LIST) for k in range(8))
+LAST_ROW = np.float32(TABLE - 1)
 ZERO, ONE, TINY = np.float32(0.0), np.float32(1.0), np.float32(1e-20)
 
 
@@ -279,7 +280,7 @@ def sample_points(n, cut, y, depth, start, place, words, lists):
         interpolate_bytes(n, np.int32(24), VALUE, words, lists)
         low -= np.float32(128.0)
     for i in range(n):
-        lists[VALUE + i] = (lists[VALUE + i] - low) * scale
+        lists[VALUE + i] = min(max((lists[VALUE + i] - low) * scale, ZERO), LAST_ROW)
     if cut.channels > 0:
         light_samples(n, cut, y, depth, lists)
 
@@ -304,7 +305,7 @@ def sample_slice(cut, row, slices, k, planes, into):
             lists[AT] = first + np.float32(1 << (CHUNK - 1)) * step
             locate(np.uint64(1), start, (m[0, 0], m[1, 0], m[2, 0]), cut.shape, place, lists)
             value = np.float32((np.float64(cut.scalars[np.uint64(place[0])]) - cut.low) * cut.scale)
-            values[into, 0, j : j + (1 << CHUNK)] = value
+            values[into, 0, j : j + (1 << CHUNK)] = min(max(value, ZERO), LAST_ROW)
         else:
             for i in range(n):
                 lists[AT + i] = first + np.float32(i) * step
