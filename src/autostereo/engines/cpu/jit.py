@@ -17,6 +17,8 @@ from typing import Any
 import numba
 from numba import config, njit
 
+from . import simd_compiled  # noqa: F401  (kernels may use the vectors of `simd`)
+
 
 def _key() -> str:
     """Digest of this engine's sources, where they lie (Numba's cache asks), Numba's version and Python's."""

@@ -14,7 +14,7 @@ from ...scene.mesh import Mesh
 from ...scene.scene import Scene
 from ..engine import Draw, Target
 from .memory import Memory
-from .mesh_panel import Block, Panel, draw_panel
+from .mesh_panel import Panel, draw_panel
 from .mesh_raster import Scratch, Shader, Surface
 from .mesh_reuse import exact_offsets
 from .mesh_setup import (
@@ -28,14 +28,14 @@ from .mesh_setup import (
     project_vertices,
     turn_normals,
 )
-from .mesh_shade import FLOAT_ROWS, INT_ROWS, STRIDE
 from .mesh_views import draw_views
 from .panel_lines import BUCKET, LinePlan, line_capacity, plan_lines
+from .panel_list import FLOAT_ROWS, INT_ROWS, STRIDE, Block
 from .scene_arrays import SceneArrays, background_word, light_array, scene_arrays
+from .simd import LANES
 from .threads import run_rows
 
-PANEL_BYTES = 230_000  # of a panel's samples and their offsets: with what else a band touches they stay in L2
-BAND_BYTES = 160_000  # of the samples of views, likewise
+BAND_BYTES = 160_000  # of the samples of a row of all views: with what else a row touches they stay in L2
 PANEL_COLUMNS = 2048  # most pixels of a panel's block
 VERTEX_CHUNK = 8192
 _counting = threading.Lock()
@@ -68,67 +68,73 @@ def draw_mesh_views(prepared: PreparedMeshes, draw: Draw, target: Target, memory
     """Draw a stack of views: every pixel of the target, and its depth if it has one."""
     views, height, width, _ = target.color.shape
     side = round(draw.options.samples**0.5)
-    block, rows_per_band = view_blocks(views, width)
+    block = view_block(views, width)
     blocks = -(-width // block)
-    surface, camera, shader = surface_at(prepared, draw, (rows_per_band, block, blocks), memory)
-    samples = rows_per_band * views * block
+    surface, camera, shader = surface_at(prepared, draw, block, blocks, memory)
+    samples = views * block + block + LANES  # a run of one view may lead on where another's has ended
     sums = 4 * samples if side > 1 else 0
     exact = (len(shader.exact), width)
     pool = memory.pool(("views", samples, sums, exact), lambda: new_scratch(samples, sums, exact))
-    offsets = np.pad(draw.offsets.astype(np.float32), (0, 15), mode="edge")
+    offsets = np.pad(draw.offsets.astype(np.float32), (0, LANES - 1), mode="edge")
     background = background_word(prepared.scene)
     out = target.color.view(np.int32).reshape(views, height, width)
     depth = np.empty((0, 0, 0), np.float32) if target.depth is None else target.depth
 
     def task(first: int, end: int) -> None:
         with pool as scratch:
-            bins = (first, end, rows_per_band, blocks, block)
+            bins = (first, end, blocks, block)
             draw_views(bins, surface, camera, shader, offsets, background, side, scratch, out, depth)
             count_samples(target, scratch)
 
-    run_rows(-(-height // rows_per_band) * blocks, task)
+    run_rows(height * blocks, task)
 
 
 def draw_mesh_panel(prepared: PreparedMeshes, draw: Draw, target: Target, memory: Memory) -> None:
     """Draw every pixel of a panel, and its depth (H, W, 3) if the target has one."""
     height, width, _ = target.color.shape
     plan = panel_lines(draw, memory)
-    columns, rows = panel_blocks(width)
+    columns = panel_block(width)
     blocks = -(-width // columns)
-    surface, camera, shader = surface_at(prepared, draw, (rows, columns, blocks), memory)
+    surface, camera, shader = surface_at(prepared, draw, columns, blocks, memory)
     side = round(draw.options.samples**0.5)
     panel = Panel(plan, draw.flip_x, draw.flip_y, draw.options.sampling == "subpixel")
-    samples, capacity = rows * columns * 3, line_capacity(plan, columns)
+    samples, capacity = columns * 3 + LANES, line_capacity(plan, columns)
     sums = samples if side > 1 else 0
     exact = (len(shader.exact), width)
     pool = memory.pool(
-        ("panel", rows, columns, capacity, sums, exact),
-        lambda: (new_block(rows, columns, capacity), new_scratch(samples, sums, exact)),
+        ("panel", columns, capacity, sums, exact),
+        lambda: (new_block(1, columns, capacity), new_scratch(samples, sums, exact)),
     )
     background = background_word(prepared.scene)
     depth = np.empty((0, 0, 0), np.float32) if target.depth is None else target.depth
 
     def task(first: int, end: int) -> None:
         with pool as (block, scratch):
-            bins = (first, end, rows, blocks, columns)
+            bins = (first, end, blocks, columns)
             draw_panel(bins, surface, camera, shader, panel, block, background, side, scratch, target.color, depth)
             count_samples(target, scratch)
 
-    run_rows(-(-height // rows) * blocks, task)
+    run_rows(height * blocks, task)
 
 
 def new_scratch(samples: int, sums: int, exact: tuple[int, int]) -> Scratch:
     """One thread's memory: a band of `samples`, accumulators for sub-samples, colours of `exact` views × width."""
-    words = np.zeros(STRIDE, np.int64)
+    band, words = np.zeros(samples, np.int64), np.zeros(2 * LANES, np.int64)
     return Scratch(
-        np.zeros(samples, np.int64),
-        np.zeros(32, np.float32),
+        band,
+        band.view(np.int32),
+        np.zeros(2 * LANES, np.float32),
         np.zeros(FLOAT_ROWS * STRIDE, np.float32),
         np.zeros(INT_ROWS * STRIDE, np.int32),
         words,
         words.view(np.int32),
+        np.zeros(3 * LANES, np.float32),
+        np.zeros(LANES, np.int32),
+        np.zeros(17, np.float32),
+        np.zeros(8 * LANES, np.float32),
+        np.zeros(4 * LANES, np.int32),
         np.zeros(sums, np.uint16),
-        np.zeros(exact[0] * exact[1], np.int32),
+        np.zeros(exact[0] * (exact[1] + LANES), np.int32),
         np.zeros((3, exact[0]), np.int32),
         np.zeros(2, np.int64),
     )
@@ -155,25 +161,23 @@ def new_block(rows: int, columns: int, capacity: int) -> Block:
     )
 
 
-def panel_blocks(width: int) -> tuple[int, int]:
-    """Columns of a panel's block and rows of a band for which samples and offsets stay in cache."""
+def panel_block(width: int) -> int:
+    """Columns of a panel's block for which samples and offsets stay in cache."""
     blocks = -(-width // PANEL_COLUMNS)
-    columns = (-(-width // blocks) + 15) // 16 * 16
-    return columns, int(np.clip(PANEL_BYTES // (36 * columns), 1, 16))
+    return (-(-width // blocks) + 15) // 16 * 16
 
 
-def view_blocks(views: int, width: int) -> tuple[int, int]:
-    """Columns of a block and rows of a band for which the samples of all views stay in cache."""
+def view_block(views: int, width: int) -> int:
+    """Columns of a block for which the samples of a row of all views stay in cache."""
     columns = max(64, BAND_BYTES // (8 * views))
     blocks = -(-width // columns)
-    block = (-(-width // blocks) + 7) // 8 * 8
-    return block, int(np.clip(BAND_BYTES // (8 * views * block), 1, 16))
+    return (-(-width // blocks) + 7) // 8 * 8
 
 
 def surface_at(
-    prepared: PreparedMeshes, draw: Draw, bins: tuple[int, int, int], memory: Memory
+    prepared: PreparedMeshes, draw: Draw, block: int, blocks: int, memory: Memory
 ) -> tuple[Surface, CameraNumbers, Shader]:
-    """Project, light, clip, cull and bin the scene's triangles; bins = (rows per band, columns per block, blocks)."""
+    """Project, light, clip, cull the scene's triangles, and bin them to rows × blocks of so many columns."""
     arrays, camera, options = prepared.arrays, draw.camera, draw.options
     numbers = camera_numbers(camera)
     count = len(arrays.positions)
@@ -182,7 +186,8 @@ def surface_at(
     lights = light_array(prepared.scene, camera)
     two_sided = bool(arrays.materials[:, 4].any())
     vertices = memory.buffer("vertices", (count, 3), np.float64)
-    attributes = memory.buffer("attributes", (count, 12 if two_sided and not per_sample else 6), np.float32)
+    sides = 2 if two_sided and not per_sample else 1
+    attributes = memory.buffer("attributes", (count, LANES * sides), np.float32)
 
     behind: list[int] = []
 
@@ -200,16 +205,16 @@ def surface_at(
             arrays, e, numbers, (faces, face_ids, vertices, attributes, uv)
         )
     side = round(options.samples**0.5)
-    bands = (bins[0], 0.5 / side, 1.0 - 0.5 / side, float(bins[1]), bins[2])
+    bins = (0.5 / side, 1.0 - 0.5 / side, float(block), blocks)
     triangles, bin_start, binned = _binned(
-        (prepared.arrays, memory), (faces, face_ids, vertices), numbers, draw.culling, bands
+        (prepared.arrays, memory), (faces, face_ids, vertices), numbers, draw.culling, bins
     )
-    columns = 6 if per_sample or arrays.materials[:, 2].any() else 3
     surface = Surface(
-        vertices, attributes, uv, triangles, bin_start, binned, arrays.face_material, arrays.materials, columns
-    )
+        vertices.ravel(), attributes.ravel(), uv, triangles.ravel(), bin_start, binned, arrays.materials,
+        sides,
+    )  # fmt: skip
     own_eye = np.float32(options.shading != "center")
-    points = bool(lights[:, 0].any())
+    diffuse = options.shading != "reuse" and not lights[:, 0].any()
     exact = exact_offsets(draw.offsets) if options.shading == "reuse" else np.empty(0, np.float32)
     shader = Shader(
         lights,
@@ -218,7 +223,7 @@ def surface_at(
         arrays.level_count,
         per_sample,
         own_eye,
-        points,
+        diffuse,
         exact,
         np.float32(camera.fx / camera.focal),
     )
@@ -246,17 +251,17 @@ def _binned(
     mesh: tuple[Any, ...],
     camera: CameraNumbers,
     culling: tuple[float, float],
-    bands: Any,
+    bins: Any,
 ) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.int32]]:
-    """Visible triangles, and the triangles of each band in the order of faces."""
+    """Visible triangles, and the triangles of each bin in the order of faces."""
     arrays, memory = held
     faces, face_ids, vertices = mesh
     chunks = max(1, min(2 * numba.get_num_threads(), len(faces) // 4096))
     edges = np.linspace(0, len(faces), chunks + 1).astype(np.int64)
-    count_bands = -(-int(camera.height) // bands[0]) * bands[4]
-    counts = np.zeros((chunks, count_bands), np.int64)
+    count_bins = int(camera.height) * bins[3]
+    counts = np.zeros((chunks, count_bins), np.int64)
     kept = np.zeros(chunks, np.int64)
-    triangles = memory.buffer("triangles", (max(len(faces), 1), 6), np.int32)
+    triangles = memory.buffer("triangles", (max(len(faces), 1), 8), np.int32)
 
     def cull(first: int, last: int) -> None:
         for c in range(first, last):
@@ -268,20 +273,21 @@ def _binned(
                 arrays,
                 camera,
                 culling,
-                bands,
+                bins,
                 triangles,
                 counts[c],
             )
 
     run_rows(chunks, cull, 1)
-    bin_start = np.zeros(count_bands + 1, np.int64)
+    bin_start = np.zeros(count_bins + 1, np.int64)
     np.cumsum(counts.sum(axis=0), out=bin_start[1:])
     cursors = bin_start[:-1] + np.cumsum(counts, axis=0) - counts
-    bins = memory.buffer("bins", (max(int(bin_start[-1]), 1),), np.int32)
+    binned = memory.buffer("bins", (int(bin_start[-1]) + LANES,), np.int32)
+    binned[-LANES:] = 0  # the last bin is read in whole steps
 
     def fill(first: int, last: int) -> None:
         for c in range(first, last):
-            fill_bins(edges[c], kept[c], triangles, vertices, camera.height, bands, cursors[c], bins)
+            fill_bins(edges[c], kept[c], triangles, bins[3], cursors[c], binned)
 
     run_rows(chunks, fill, 1)
-    return triangles, bin_start, bins
+    return triangles, bin_start, binned

@@ -1,8 +1,8 @@
 """Meshes straight to an interlaced panel: every sub-pixel its own camera offset, no stack of views in between.
 
-For each segment (mesh_raster): the lines of sub-pixels (panel_lines) that it may meet, and the interval of each that
-it may cover (SIMD over lines); these samples in one list; coverage, depth and colour at their exact offsets by the
-expressions of every other draw (SIMD over samples); then one scalar pass that keeps what is nearer.
+For each segment (mesh_raster) the samples that it may cover are listed (panel_list); coverage, depth and colour at
+their exact offsets are those of every other draw, eight samples at a time (SIMD over samples), and one scalar pass
+keeps what is nearer.
 """
 
 from __future__ import annotations
@@ -12,33 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_block import draw_block
-from .mesh_reuse import finish_list, shade_exact
-from .mesh_shade import (
-    ADDRESS,
-    BASE,
-    CAPACITY,
-    LANE_OFFSET,
-    LANE_U,
-    LANE_X,
-    LANE_Z,
-    OFFSET,
-    ONE,
-    RUN,
-    ZERO,
-    U,
-    X,
-    Z,
-    quantize,
-    whole_steps,
-)
-from .panel_lines import BUCKET, LinePlan, make_lines, row_offsets
-from .samples import hit, nearer, word
-
-LINES_AT_ONCE = 512
-SLACK = np.float32(4e-3)  # rounding moves the end of a segment by less
-FAR = np.float32(1e9)
-LONG = 8  # samples in a line, from which a line is listed at once
+from .mesh_block import draw_row
+from .mesh_reuse import shade_exact, shade_or_reuse
+from .mesh_shade import PLAIN, to_levels
+from .panel_lines import LinePlan, make_lines, row_offsets
+from .panel_list import ADDRESS, Block, draw_stretch
+from .samples import clear_samples, depth_bits, hit, keep_nearer, store_words
+from .scalars import BYTE, ZERO
+from .simd import LANES, gather, greater, lesser, load, mask_word, select, splat, to_float, to_int
 
 
 class Panel(NamedTuple):
@@ -48,22 +29,6 @@ class Panel(NamedTuple):
     flip_x: bool
     flip_y: bool
     subpixel: bool
-
-
-class Block(NamedTuple):
-    """Samples of a few rows of the panel, one thread's own memory.
-
-    offsets (R·3·B,) float32: camera offset of each sample, at row·3·B + channel·B + pixel; lines, addresses, starts
-    (R, …): see make_lines; found, found_ints, u: scratch.
-    """
-
-    offsets: np.ndarray
-    lines: np.ndarray
-    addresses: np.ndarray
-    starts: np.ndarray
-    found: np.ndarray
-    found_ints: np.ndarray
-    u: np.ndarray
 
 
 class Place(NamedTuple):
@@ -82,179 +47,54 @@ class Place(NamedTuple):
 
 
 @inlined
-def interval(slope, misfit, period, drift, bounded_below):
-    """How an edge that moves by `slope` pixels per unit of offset bounds a line's samples.
-
-    The sample j with x = x0 + j·period and offset o0 + j·drift lies right of the edge where
-    j·(period − drift·slope) ≥ gap. Returns what gap is to be multiplied by, and what is to be added for the first and
-    for the last sample; both infinite where the edge is nearly parallel to the line.
-    """
-    across = period - drift * slope
-    slack = misfit * abs(slope) + SLACK
-    if abs(across) * np.float32(512.0) < slack:
-        return ZERO, -FAR, FAR
-    inverse = ONE / across
-    slack = abs(slack * inverse)
-    if (across > ZERO) == bounded_below:
-        return inverse, -slack, FAR
-    return inverse, -FAR, slack
+def channel_color(u, green, blue, segment):
+    """Interpolated colour of each sample's own channel of a segment of levels, as RGBA bytes."""
+    start = select(blue, segment[2], select(green, segment[1], splat(segment[0])))
+    step = select(blue, segment[10], select(green, segment[9], splat(segment[8])))
+    value = to_int(lesser(greater(u * step + start, ZERO), BYTE))
+    return select(blue, value << np.int32(16), select(green, value << np.int32(8), value))
 
 
 @inlined
-def find_intervals(first, count, row, ends, place, lists, ints):
-    """Samples of each line that the segment may cover: place of the first and their number; returns the most."""
-    listed = count
-    x1, p1, x2, p2 = ends
-    plan, lines, addresses = place.plan, place.block.lines, place.block.addresses
-    at, spread = place.at[4], place.at[5]
-    period = np.float32(plan.period)
-    drift, misfit = np.float32(plan.slope * plan.step), np.float32(plan.misfit)
-    by1, low1, high1 = interval(p1, misfit, period, drift, True)
-    by2, low2, high2 = interval(p2, misfit, period, drift, False)
-    low1, high1 = low1 - spread * abs(by1), high1 + spread * abs(by1)
-    low2, high2 = low2 - spread * abs(by2), high2 + spread * abs(by2)
-    x, samples, offset = lines[row, 0], lines[row, 1], lines[row, 2]
-    address = addresses[row]
-    count = whole_steps(count)
-    for i in range(count):
-        k = first + i
-        gap1 = (x1 + offset[k] * p1 - x[k] - at) * by1
-        gap2 = (x2 + offset[k] * p2 - x[k] - at) * by2
-        start = min(max(max(np.ceil(gap1 + low1), np.ceil(gap2 + low2)), ZERO), samples[k])
-        end = min(min(np.floor(gap1 + high1), np.floor(gap2 + high2)) + ONE, samples[k])
-        lists[RUN + i] = end - start
-        lists[LANE_X + i] = start
-    for i in range(count):
-        ints[BASE + i] = np.int32(address[first + i] + np.int32(lists[LANE_X + i] * period))
-    most = np.int32(0)
-    for i in range(listed):
-        most = max(most, np.int32(lists[RUN + i]))
-    return most
+def draw_listed(n, place, row, ends, what, scratch):
+    """Draw the listed samples of a segment; what = (depths, kind, shader, shading)."""
+    depths, kind, shader, shading = what
+    ints, segment, band, halves = scratch.ints, scratch.segment, scratch.band, scratch.halves
+    words, word_halves, offsets = scratch.words, scratch.word_halves, place.block.offsets
+    reuse = shader.exact.shape[0] > 0 and kind != PLAIN
+    columns, first = np.int32(place.columns), np.float32(place.first)
+    begin = np.int32(row * 3 * place.columns)
+    two = np.int32(2 * place.columns)
+    red, middle, last, at = place.at[0], place.at[1], place.at[2], place.at[3]
+    for i in range(0, n, LANES):
+        address = load(ints, ADDRESS + np.uint64(i))
+        k = address - begin
+        green, blue = k >= columns, k >= two
+        k = k - select(blue, two, select(green, splat(columns), np.int32(0)))
+        x = (to_float(k) + first) + select(blue, last, select(green, middle, splat(red)))
+        offset = gather(offsets, address)
+        covered, z, u = hit(x, offset, ends, depths)
+        depth = depth_bits(covered, z)
+        seen = mask_word(depth > gather(halves, address * np.int32(2) + np.int32(1)))
+        if seen == 0:
+            continue
+        if kind == PLAIN:
+            color = channel_color(u, green, blue, segment)
+        else:
+            color = shade_or_reuse(kind, reuse, seen, (x, z, offset), u, at, shader, shading, scratch)
+        store_words(depth, color, word_halves)
+        for j in range(LANES):
+            keep_nearer(np.uint64(ints[ADDRESS + np.uint64(i + j)]), words[j], band)
 
 
 @inlined
-def place_samples(n, row, place, lists, ints):
-    """Pixel position and exact camera offset of the listed samples."""
-    offsets, red, green, blue = place.block.offsets, place.at[0], place.at[1], place.at[2]
-    begin, first, columns = np.int32(row * 3 * place.columns), np.float32(place.first), np.float32(place.columns)
-    for i in range(n):
-        lists[LANE_OFFSET + i] = offsets[np.uint64(ints[ADDRESS + i])]
-    for i in range(n):
-        k = np.float32(np.int32(ints[ADDRESS + i] - begin))
-        at = red if k < columns else (green if k < columns + columns else blue)
-        k = k if k < columns else (k - columns if k < columns + columns else k - columns - columns)
-        lists[LANE_X + i] = (k + first) + at
-
-
-@inlined
-def make_words(n, row, columns, ends, depths, color, lists, ints, halves):
-    """Words of the listed samples, the colour that of their own channel; 0 where the segment does not cover them."""
-    r, g, b, dr, dg, db = color
-    begin, green, blue = np.int32(row * 3 * columns), np.float32(columns), np.float32(2 * columns)
-    for i in range(n):
-        covered, z, u = hit(lists[LANE_X + i], lists[LANE_OFFSET + i], ends, depths)
-        k = np.float32(np.int32(ints[ADDRESS + i] - begin))
-        start = r if k < green else (g if k < blue else b)
-        step = dr if k < green else (dg if k < blue else db)
-        shift = np.int32(0) if k < green else (np.int32(8) if k < blue else np.int32(16))
-        halves[np.uint64(2) * i] = quantize(start + u * step) << shift
-        halves[np.uint64(2) * i + np.uint64(1)] = np.float32(z if covered else ZERO).view(np.int32)
-
-
-@inlined
-def keep_nearer(n, ints, words, band):
-    """Depth test and store of the listed samples."""
-    for i in range(n):
-        a = np.uint64(ints[ADDRESS + i])
-        old, new = band[a], words[i]
-        band[a] = new if nearer(new, old) else old
-
-
-@inlined
-def keep_visible(n, ends, depths, lists, ints, band):
-    """Depth test of the listed samples; the visible ones stay in the list, whose new length is returned."""
-    for i in range(n):
-        covered, z, u = hit(lists[LANE_X + i], lists[LANE_OFFSET + i], ends, depths)
-        lists[LANE_U + i] = u
-        lists[LANE_Z + i] = z if covered else ZERO
-    kept = np.uint64(0)
-    for i in range(n):
-        a = np.uint64(ints[ADDRESS + i])
-        old, z = band[a], lists[LANE_Z + i]
-        new = word(z, np.int32(0))
-        visible = nearer(new, old)
-        band[a] = new if visible else old
-        ints[ADDRESS + kept] = np.int32(a)
-        lists[U + kept] = lists[LANE_U + i]
-        lists[Z + kept] = z
-        lists[X + kept] = lists[LANE_X + i]
-        lists[OFFSET + kept] = lists[LANE_OFFSET + i]
-        kept += np.uint64(visible)
-    return kept
-
-
-@inlined
-def draw_listed(n, row, place, ends, depths, plain, shader, shading, scratch):
-    """Draw the listed samples of a segment."""
-    lists, ints, segment = scratch.lists, scratch.ints, scratch.segment
-    for i in range(16):  # whole SIMD steps
-        ints[ADDRESS + n + np.uint64(i)] = np.int32(row) * np.int32(3) * np.int32(place.columns)
-    whole = whole_steps(n)
-    place_samples(whole, row, place, lists, ints)
-    if plain:
-        color = (segment[0], segment[1], segment[2], segment[16], segment[17], segment[18])
-        make_words(whole, row, place.columns, ends, depths, color, lists, ints, scratch.halves)
-        keep_nearer(n, ints, scratch.words, scratch.band)
-        return
-    n = keep_visible(n, ends, depths, lists, ints, scratch.band)
-    if n > np.uint64(0):
-        colors, spans, counts = scratch.colors, scratch.spans, scratch.counts
-        finish_list(n, place.at[3], shader, shading, segment, lists, ints, colors, spans, counts, scratch.band)
-
-
-@inlined
-def draw_segment(place, row, ends, depths, plain, shader, shading, scratch):
-    """Draw one segment in every sub-pixel; shading = (material, side, row, gradient)."""
-    lists, ints, segment = scratch.lists, scratch.ints, scratch.segment
-    x1, p1, x2, p2 = ends
-    plan = place.plan
-    if shader.exact.shape[0] > 0 and not plain:
-        shade_exact(
-            ends, depths, place.at[3], place.width, shader, shading, segment, lists, ints, scratch.colors, scratch.spans
-        )
-    low, high = np.float32(plan.low), np.float32(plan.high)
-    left = min(x1 + low * p1, x1 + high * p1) - np.float32(2.0)
-    right = max(x2 + low * p2, x2 + high * p2) + np.float32(1.0)
-    first, columns = np.float32(place.first), np.float32(place.columns)
-    if right < first or left > first + columns:
-        return
-    starts = place.block.starts[row]
-    left = max(left - first - np.float32(plan.reach), ZERO)
-    right = min(right - first, columns - ONE)
-    line, stop = starts[np.int64(left) >> BUCKET], starts[(np.int64(right) >> BUCKET) + 1]
-    n = np.uint64(0)
-    period = np.int32(plan.period)
-    while line < stop:
-        count = np.uint64(min(stop - line, LINES_AT_ONCE))
-        most = find_intervals(np.uint64(line), count, row, ends, place, lists, ints)
-        for k in range(min(most, np.int32(LONG))):
-            if n > np.uint64(CAPACITY - LINES_AT_ONCE):
-                draw_listed(n, row, place, ends, depths, plain, shader, shading, scratch)
-                n = np.uint64(0)
-            for i in range(count):
-                ints[ADDRESS + n] = ints[BASE + i] + np.int32(k) * period
-                n += np.uint64(lists[RUN + i] > np.float32(k))
-        if most > np.int32(LONG):
-            for i in range(count):
-                for k in range(np.int32(LONG), np.int32(lists[RUN + i])):
-                    if n >= np.uint64(CAPACITY - LINES_AT_ONCE):
-                        draw_listed(n, row, place, ends, depths, plain, shader, shading, scratch)
-                        n = np.uint64(0)
-                    ints[ADDRESS + n] = ints[BASE + i] + np.int32(k) * period
-                    n += np.uint64(1)
-        line += np.int64(count)
-    if n > np.uint64(0):
-        draw_listed(n, row, place, ends, depths, plain, shader, shading, scratch)
+def draw_segment(place, ends, depths, kind, shader, shading, scratch):
+    """Draw one segment in every sub-pixel."""
+    if kind == PLAIN:
+        to_levels(scratch.segment)
+    elif shader.exact.shape[0] > 0:
+        shade_exact(ends, depths, place.at[3], place.width, shader, shading, scratch)
+    draw_stretch(draw_listed, place, 0, ends, (depths, kind, shader, shading), scratch)
 
 
 @kernel
@@ -263,23 +103,14 @@ def drawn_columns(bin_index, columns, surface, camera, plan):
     left, right = np.float64(columns[1]), np.float64(columns[0])
     scale = camera.fx / camera.focal
     for entry in range(surface.bin_start[bin_index], surface.bin_start[bin_index + 1]):
-        for k in range(3):
-            corner = np.uint64(surface.triangles[np.uint64(surface.bins[entry]), k])
-            x, p = surface.vertices[corner, 0], scale * (1.0 - surface.vertices[corner, 2])
+        index = np.uint64(surface.bins[entry]) * np.uint64(8)
+        for k in range(np.uint64(3)):
+            corner = np.uint64(surface.triangles[index + k]) * np.uint64(3)
+            x, p = surface.vertices[corner], scale * (1.0 - surface.vertices[corner + np.uint64(2)])
             left = min(left, x + plan.low * p, x + plan.high * p)
             right = max(right, x + plan.low * p, x + plan.high * p)
     first = max(np.int64(max(left - 2.0, 0.0)), columns[0])
     return first, max(min(np.int64(min(right, 1e9)) + 2, columns[1]), first)
-
-
-@inlined
-def clear_row(begin, count, plane, background, band):
-    """Empty samples of a row: infinitely far, the background's colour."""
-    empty = np.int64(background) & np.int64(0xFFFFFFFF)
-    for c in range(3):
-        first = np.uint64(begin + c * plane)
-        for i in range(np.uint64(count)):
-            band[first + i] = empty
 
 
 @inlined
@@ -346,25 +177,26 @@ def store_depth(row, columns, drawn, base, plane, focal, flip, band, depth):
 
 @kernel
 def draw_panel(bins, surface, camera, shader, panel, block, background, side, scratch, out, depth):
-    """Draw bins (first, end, rows per band, blocks a row, columns per block) into out (H, W, 3) uint8.
+    """Draw bins (first, end, blocks a row, columns per block) into out (H, W, 3) uint8.
 
     side² samples a sub-pixel; depth (H, W, 3) float32 of the first, or of no size when it is not wanted.
     """
     height, width, _ = out.shape
-    flat, plan, plane = out.reshape(-1), panel.plan, bins[4]
-    step = -3 if panel.flip_x else 3
+    flat, plan, plane = out.reshape(-1), panel.plan, bins[3]
+    step, span = -3 if panel.flip_x else 3, (np.float32(plan.low), np.float32(plan.high))
+    starts, lines, addresses = block.starts[0], block.lines[0], block.addresses[0]
+    found, found_ints = block.found, block.found_ints
     for k in range(bins[0], bins[1]):
-        first_row, first = k // bins[3] * bins[2], k % bins[3] * bins[4]
-        rows, columns = (first_row, min(first_row + bins[2], height)), (first, min(first + bins[4], width))
+        r, first = k // bins[2], k % bins[2] * bins[3]
+        columns = (first, min(first + bins[3], width))
+        row = height - 1 - r if panel.flip_y else r
         drawn = drawn_columns(k, columns, surface, camera, plan)
-        count = drawn[1] - drawn[0]
-        for r in range(rows[0], rows[1]) if count > 0 else range(0):
-            row, base = height - 1 - r if panel.flip_y else r, (r - rows[0]) * 3 * plane
-            row_offsets(row, width, panel.flip_x, drawn, base, first, plane, plan, block.u, block.offsets)
-            i = r - rows[0]
-            starts, lines, addresses = block.starts[i], block.lines[i], block.addresses[i]
-            found = (block.found, block.found_ints)
-            make_lines(row, width, panel.flip_x, drawn, base, first, plane, plan, starts, lines, addresses, *found)
+        base, count = drawn[0] - first, drawn[1] - drawn[0]
+        if count > 0:
+            row_offsets(row, width, panel.flip_x, drawn, 0, first, plane, plan, block.u, block.offsets)
+            make_lines(
+                row, width, panel.flip_x, drawn, 0, first, plane, plan, starts, lines, addresses, found, found_ints
+            )
         for s in range(side * side) if count > 0 else range(0):
             x, y = (s % side + 0.5) / side, (s // side + 0.5) / side
             one, third = np.float32(x), np.float32(1.0 / 3.0)
@@ -373,24 +205,17 @@ def draw_panel(bins, surface, camera, shader, panel, block, background, side, sc
                 red, green, blue = np.float32(x / 3.0), np.float32((1.0 + x) / 3.0), np.float32((2.0 + x) / 3.0)
                 at = (red, green, blue, ZERO, green, third)
             place = Place(block, plan, first, plane, at, np.float32(width))
-            for r in range(rows[0], rows[1]):
-                base = (r - rows[0]) * 3 * plane + drawn[0] - first
-                clear_row(base, count, plane, background, scratch.band)
-            draw_block(draw_segment, place, rows, k, surface, camera, shader, (x, y), scratch)
-            for r in range(rows[0], rows[1]) if side > 1 else range(0):
-                base = (r - rows[0]) * 3 * plane + drawn[0] - first
-                add_samples(count, base, plane, scratch.band, scratch.sums)
-        for r in range(rows[0], rows[1]):
-            row = height - 1 - r if panel.flip_y else r
-            base = (r - rows[0]) * 3 * plane + drawn[0] - first
+            for c in range(3):
+                clear_samples(base + c * plane, count, background, scratch.halves)
+            draw_row(draw_segment, place, span, r, k, surface, camera, shader, (x, y), scratch)
             if side > 1:
-                take_means(count, base, plane, side * side, scratch.band, scratch.sums)
-            if depth.size > 0:
-                store_depth(
-                    row, columns, drawn, base, plane, np.float32(camera.focal), panel.flip_x, scratch.band, depth
-                )
-            start, end = row * width * 3, (row + 1) * width * 3 - 3
-            begin = end if panel.flip_x else start
-            store_background(begin + step * columns[0], step, drawn[0] - columns[0], background, flat)
-            store_row(begin + step * drawn[0], step, base, count, plane, scratch.band, flat)
-            store_background(begin + step * drawn[1], step, columns[1] - drawn[1], background, flat)
+                add_samples(count, base, plane, scratch.band, scratch.sums)
+        if side > 1:
+            take_means(count, base, plane, side * side, scratch.band, scratch.sums)
+        if depth.size > 0:
+            store_depth(row, columns, drawn, base, plane, np.float32(camera.focal), panel.flip_x, scratch.band, depth)
+        start, end = row * width * 3, (row + 1) * width * 3 - 3
+        begin = end if panel.flip_x else start
+        store_background(begin + step * columns[0], step, drawn[0] - columns[0], background, flat)
+        store_row(begin + step * drawn[0], step, base, count, plane, scratch.band, flat)
+        store_background(begin + step * drawn[1], step, columns[1] - drawn[1], background, flat)

@@ -14,43 +14,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .jit import inlined, kernel
-from .mesh_shade import (
-    KB,
-    KG,
-    KR,
-    NX,
-    NY,
-    NZ,
-    ONE,
-    SB,
-    SG,
-    SR,
-    TS,
-    TT,
-    ZERO,
-    add_light,
-    clear_sums,
-    interpolate,
-    locate,
-    modulate,
-    normalize_normals,
-    pack,
-    whole_steps,
-)
-from .mesh_texture import level_of_detail, modulate_by_texture
+from .jit import inlined
+from .scalars import ZERO
+from .simd import LANES, gather, load, mask_word, select, splat, store, to_float
 
-K = [np.uint64(k) for k in range(14)]
-K0, K1, K2, K3, K4, K5, K12, K13 = K[0], K[1], K[2], K[3], K[4], K[5], K[12], K[13]
+X1, Z1, P1, U1, X2, Z2, P2, U2 = (np.uint64(LANES * k) for k in range(8))
+TEXTURE = 6  # attributes: the first lane of texture coordinates
+APART = np.float32(1e-2)  # pixels: rounding moves the ends of a segment by less
 
 
 class Surface(NamedTuple):
     """Everything a raster kernel reads of the scene at one camera.
 
-    vertices (N, 3) float64: x at the centre camera, y, focal/depth; attributes (N, 6 or 12) float32; uv (N, 2) float64;
-    triangles (T, 6) int32: see mesh_setup.cull_and_count; bin_start (B + 1,), bins: triangles of each bin, in the order
-    of faces; face_material (F,) int32; columns: attributes that a segment needs; materials (M, 8) float32: ambient,
-    diffuse, specular, shininess, two-sided, texture or −1, plain (needs no list of samples), 0.
+    vertices (N·3,) float64: x at the centre camera, y, focal/depth; attributes (N·S·8,) float32: of each of the S sides
+    lit, see mesh_setup; uv (N, 2) float64; triangles (T·8,) int32: see mesh_setup.cull_and_count; bin_start (B + 1,),
+    bins: triangles of each row and block of columns, in the
+    order of faces; sides: S; materials (M, 8) float32:
+    ambient, diffuse, specular, shininess, two-sided, texture or −1, plain (only colours), 0.
     """
 
     vertices: np.ndarray
@@ -59,21 +39,31 @@ class Surface(NamedTuple):
     triangles: np.ndarray
     bin_start: np.ndarray
     bins: np.ndarray
-    face_material: np.ndarray
     materials: np.ndarray
-    columns: int
+    sides: int
 
 
 class Scratch(NamedTuple):
-    """One thread's own memory: band of samples, segment ends, lists (mesh_shade), words of lanes, and as halves,
-    sums of sub-samples; colours and spans of exact views, numbers of listed and reused samples (mesh_reuse)."""
+    """One thread's own memory.
+
+    band: samples, and the same as 32-bit halves; segment (16,) float32: attributes at the left end, then differences;
+    lists, ints: of a panel (panel_list); words (16,), and as halves: samples at hand; lanes (24,) float32 and chosen
+    (8,) int32: of eight samples; detail (17,) float32: row_geometry, then uv_gradient; setup, ends: see cut_triangles;
+    sums of sub-samples; colours and spans of exact views, numbers of listed and reused samples (mesh_reuse).
+    """
 
     band: np.ndarray
+    halves: np.ndarray
     segment: np.ndarray
     lists: np.ndarray
     ints: np.ndarray
     words: np.ndarray
-    halves: np.ndarray
+    word_halves: np.ndarray
+    lanes: np.ndarray
+    chosen: np.ndarray
+    detail: np.ndarray
+    setup: np.ndarray
+    ends: np.ndarray
     sums: np.ndarray
     colors: np.ndarray
     spans: np.ndarray
@@ -81,11 +71,12 @@ class Scratch(NamedTuple):
 
 
 class Shader(NamedTuple):
-    """What `shade` reads besides the segment. (Arrays are taken out of tuples once per band: each time counts a
+    """What shading reads besides the segment. (Arrays are taken out of tuples once per band: each time counts a
     reference, atomically.)
 
     lights (L, 8) float32 (scene_arrays.light_array); texels, texture_levels, level_count as in SceneArrays; own_eye
-    1 or 0; point_lights: any; exact (E,) float32: offsets of exact views, none without reuse; slide: fx/focal.
+    1 or 0; diffuse: there are but directional lights, and no reuse; exact (E,) float32: offsets of exact views, none
+    without reuse; slide: fx/focal.
     """
 
     lights: np.ndarray
@@ -94,66 +85,110 @@ class Shader(NamedTuple):
     level_count: np.ndarray
     per_sample: bool
     own_eye: np.float32
-    point_lights: bool
+    diffuse: bool
     exact: np.ndarray
     slide: np.float32
 
 
 @inlined
-def edge_through(vertices, top, bottom):
-    """An edge as `cut_edge` needs it.
+def cut_edge(top, bottom, y, scale):
+    """Where row y crosses eight edges: x at the centre, focal/depth, shift per unit of offset, perspective parameter.
 
-    Always from the upper to the lower vertex, so that triangles sharing the edge cut it at the same bits.
+    top, bottom: (x, y, focal/depth) of the vertices, float64; scale = fx/focal. Always from the upper to the lower
+    vertex, so that triangles sharing the edge cut it at the same bits.
     """
-    x, y, z = vertices[top, 0], vertices[top, 1], vertices[top, 2]
-    below = vertices[bottom, 2]
-    per_row = 1.0 / (vertices[bottom, 1] - y)
-    return x, y, z, (vertices[bottom, 0] - x) * per_row, (below - z) * per_row, per_row * below, top, bottom
+    (x, y0, z), (below_x, below_y, below_z) = top, bottom
+    per_row = splat(1.0) / (below_y - y0)
+    down = splat(y) - y0
+    z_here = z + down * ((below_z - z) * per_row)
+    u = to_float(down * (per_row * below_z)) / to_float(z_here)
+    here = x + down * ((below_x - x) * per_row)
+    return to_float(here), to_float(z_here), to_float((splat(1.0) - z_here) * scale), u
 
 
 @inlined
-def cut_edge(edge, y, scale):
-    """Where row y crosses an edge: x at the centre, focal/depth, shift per unit of offset, perspective parameter, ends.
-
-    scale = fx/focal.
-    """
-    x, top, z, slope_x, slope_z, slope_u, a, b = edge
-    down = y - top
-    z = z + down * slope_z
-    u = np.float32(down * slope_u) / np.float32(z)
-    return np.float32(x + down * slope_x), np.float32(z), np.float32(scale * (1.0 - z)), u, a, b
+def corner_of(vertices, corner):
+    """(x, y, focal/depth) of eight vertices; `vertices` is flat."""
+    first = corner * np.int32(3)
+    return gather(vertices, first), gather(vertices, first + np.int32(1)), gather(vertices, first + np.int32(2))
 
 
 @inlined
-def fill_segment(attributes, left, right, first, columns, segment):
-    """Attributes first … first + columns: at the left end in segment[:16], the difference to the right in [16:]."""
-    u, a, b = left[3], left[4], left[5]
-    w, c, d = right[3], right[4], right[5]
-    for k in range(columns):
-        start = attributes[a, first + k] + u * (attributes[b, first + k] - attributes[a, first + k])
-        end = attributes[c, first + k] + w * (attributes[d, first + k] - attributes[c, first + k])
-        segment[k] = start
-        segment[16 + k] = end - start
+def choose(mask, a, b):
+    """Vertices of `a` where the mask holds, else of `b`."""
+    return select(mask, a[0], b[0]), select(mask, a[1], b[1]), select(mask, a[2], b[2])
+
+
+@inlined
+def cut_triangles(index, vertices, triangles, row, sample_y, scale, span, setup, ends):
+    """The segments of eight triangles in one row; returns the bits of those seen from the front, and from behind.
+
+    setup (64,) float32: X1, Z1, P1, U1 of the left ends, then of the right ends, in lanes (rows of 8); ends (32,)
+    int32: upper and lower vertex of the left, then of the right edge. A triangle that all offsets in `span` see from
+    the other side, or whose rows do not hold the sample, has no bit.
+    """
+    first = index * np.int32(8)
+    a, b, c = gather(triangles, first), gather(triangles, first + np.int32(1)), gather(triangles, first + np.int32(2))
+    mirrored = (gather(triangles, first + np.int32(3)) & np.int32(1)) == np.int32(0)
+    top, middle, bottom = corner_of(vertices, a), corner_of(vertices, b), corner_of(vertices, c)
+    y, at = row + sample_y, np.float64(row)
+    inside = (splat(at) >= top[1] - sample_y) & (splat(at) < bottom[1] - sample_y)
+    upper = splat(y) < middle[1]
+    xl, zl, pl, ul = cut_edge(top, bottom, y, scale)
+    xr, zr, pr, ur = cut_edge(choose(upper, top, middle), choose(upper, middle, bottom), y, scale)
+    d, e = select(upper, a, b), select(upper, b, c)
+    store(setup, X1, select(mirrored, xr, xl))
+    store(setup, Z1, select(mirrored, zr, zl))
+    store(setup, P1, select(mirrored, pr, pl))
+    store(setup, U1, select(mirrored, ur, ul))
+    store(setup, X2, select(mirrored, xl, xr))
+    store(setup, Z2, select(mirrored, zl, zr))
+    store(setup, P2, select(mirrored, pl, pr))
+    store(setup, U2, select(mirrored, ul, ur))
+    store(ends, 0, select(mirrored, d, a))
+    store(ends, LANES, select(mirrored, e, c))
+    store(ends, 2 * LANES, select(mirrored, a, d))
+    store(ends, 3 * LANES, select(mirrored, c, e))
+    wide, shift = xr - xl, pr - pl
+    wide, shift = select(mirrored, splat(ZERO) - wide, wide), select(mirrored, splat(ZERO) - shift, shift)
+    low, high = wide + shift * span[0], wide + shift * span[1]
+    front = inside & ((low >= -APART) | (high >= -APART))
+    behind = inside & ((low <= APART) | (high <= APART))
+    return mask_word(front), mask_word(behind)
+
+
+@inlined
+def fill_segment(attributes, sides, side, left, right, segment):
+    """Attributes at the left end in segment[:8], the difference to the right in [8:]; left, right: (u, vertices)."""
+    step, first = np.uint64(LANES * sides), np.uint64(LANES * side)
+    start = load(attributes, left[1] * step + first)
+    start = start + (load(attributes, left[2] * step + first) - start) * left[0]
+    end = load(attributes, right[1] * step + first)
+    end = end + (load(attributes, right[2] * step + first) - end) * right[0]
+    store(segment, 0, start)
+    store(segment, LANES, end - start)
 
 
 @inlined
 def fill_uv(uv, corners, left, right, segment):
     """Texture coordinates at both ends, less the triangle's own whole part (levels repeat up to ±4096 times)."""
-    u, a, b = left[3], left[4], left[5]
-    w, c, d = right[3], right[4], right[5]
+    (u, a, b), (w, c, d) = left, right
     for k in range(2):
         base = np.floor(min(uv[corners[0], k], uv[corners[1], k], uv[corners[2], k]))
         start = uv[a, k] - base + u * (uv[b, k] - uv[a, k])
         end = uv[c, k] - base + w * (uv[d, k] - uv[c, k])
-        segment[12 + k] = np.float32(start)
-        segment[28 + k] = np.float32(end - start)
+        segment[TEXTURE + k] = np.float32(start)
+        segment[LANES + TEXTURE + k] = np.float32(end - start)
 
 
 @inlined
-def uv_gradient(v, uv, corners, camera):
-    """Derivatives of 1/depth and uv/depth over the picture as functions of the offset; see level_of_detail."""
+def uv_gradient(vertices, uv, corners, camera, detail):
+    """Derivatives of 1/depth and uv/depth over the picture as functions of the offset into detail[6:17].
+
+    See level_of_detail.
+    """
     a, b, c = corners[0], corners[1], corners[2]
-    scale = camera.fx / camera.focal
+    v, scale = vertices.reshape(-1, 3), camera.fx / camera.focal
     xb, xc = v[b, 0] - v[a, 0], v[c, 0] - v[a, 0]
     pb, pc = scale * (v[a, 2] - v[b, 2]), scale * (v[a, 2] - v[c, 2])
     yb, yc = v[b, 1] - v[a, 1], v[c, 1] - v[a, 1]
@@ -163,75 +198,18 @@ def uv_gradient(v, uv, corners, camera):
     sa, ta = (uv[a, 0] - s0) * v[a, 2], (uv[a, 1] - t0) * v[a, 2]
     sb, tb = (uv[b, 0] - s0) * v[b, 2] - sa, (uv[b, 1] - t0) * v[b, 2] - ta
     sc, tc = (uv[c, 0] - s0) * v[c, 2] - sa, (uv[c, 1] - t0) * v[c, 2] - ta
-    return (
-        np.float32(zb * yc - zc * yb),
-        np.float32(sb * yc - sc * yb),
-        np.float32(tb * yc - tc * yb),
-        np.float32(zc * xb - zb * xc),
-        np.float32(sc * xb - sb * xc),
-        np.float32(tc * xb - tb * xc),
-        np.float32(zc * pb - zb * pc),
-        np.float32(sc * pb - sb * pc),
-        np.float32(tc * pb - tb * pc),
-        np.float32(xb * yc - xc * yb),
-        np.float32(pb * yc - pc * yb),
-    )
-
-
-@kernel
-def shade(n, shader, material, side, row, gradient, segment, lists, ints):
-    """Colours of a list of samples of one segment, as RGBA bytes.
-
-    material = (ambient, diffuse, specular, shininess, texture); row = what `locate` needs; gradient = uv_gradient.
-    """
-    ambient, diffuse, specular, shininess, texture = material
-    listed = n
-    n = whole_steps(n)
-    interpolate(n, segment, K0, KR, lists)
-    interpolate(n, segment, K1, KG, lists)
-    interpolate(n, segment, K2, KB, lists)
-    if texture >= ZERO:
-        interpolate(n, segment, K12, TS, lists)
-        interpolate(n, segment, K13, TT, lists)
-        t = np.int64(texture)
-        levels = shader.texture_levels
-        level_of_detail(n, gradient, (np.float32(levels[t, 0, 1]), np.float32(levels[t, 0, 2])), lists)
-        modulate_by_texture(listed, shader.texels, t, levels, shader.level_count[t] - 1, lists)
-    if shader.per_sample:
-        interpolate(n, segment, K3, NX, lists)
-        interpolate(n, segment, K4, NY, lists)
-        interpolate(n, segment, K5, NZ, lists)
-        normalize_normals(n, ONE - np.float32(2 * side), lists)
-        clear_sums(n, lists)
-        if specular > ZERO or shader.point_lights:
-            locate(n, row, lists)
-        for k in range(shader.lights.shape[0]):
-            add_light(n, k, shader.lights, (specular, shininess), (shader.own_eye, row[4]), lists)
-        modulate(n, ambient, diffuse, specular, lists)
-    else:
-        interpolate(n, segment, K3, SR, lists)
-        interpolate(n, segment, K4, SG, lists)
-        interpolate(n, segment, K5, SB, lists)
-    pack(n, lists, ints)
+    detail[6], detail[7], detail[8] = zb * yc - zc * yb, sb * yc - sc * yb, tb * yc - tc * yb
+    detail[9], detail[10], detail[11] = zc * xb - zb * xc, sc * xb - sb * xc, tc * xb - tb * xc
+    detail[12], detail[13], detail[14] = zc * pb - zb * pc, sc * pb - sb * pc, tc * pb - tb * pc
+    detail[15], detail[16] = xb * yc - xc * yb, pb * yc - pc * yb
 
 
 @inlined
-def row_geometry(y, camera):
-    """What `locate` needs to know of row y."""
-    slope = (camera.centre_y - y) / camera.fy - camera.offset_y / camera.focal
-    return (
-        np.float32(1.0 / camera.fx),
-        np.float32(camera.centre_x),
-        np.float32(1.0 / camera.focal),
-        np.float32(slope),
-        np.float32(camera.offset_y),
-        np.float32(camera.focal),
-    )
-
-
-@inlined
-def rows_of(vertices, corners, sample_y, first_row, end_row):
-    """Rows of first_row … end_row whose sample lies in top ≤ y < bottom of the triangle."""
-    top = max(vertices[corners[0], 1] - sample_y, first_row - 1.0)
-    bottom = min(vertices[corners[2], 1] - sample_y, end_row + 1.0)
-    return max(int(np.ceil(top)), first_row), min(int(np.ceil(bottom)), end_row)
+def row_geometry(y, camera, detail):
+    """What `locate` needs to know of row y into detail[:6]."""
+    detail[0] = 1.0 / camera.fx
+    detail[1] = camera.centre_x
+    detail[2] = 1.0 / camera.focal
+    detail[3] = (camera.centre_y - y) / camera.fy - camera.offset_y / camera.focal
+    detail[4] = camera.offset_y
+    detail[5] = camera.focal

@@ -11,11 +11,13 @@ from __future__ import annotations
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_raster import shade
-from .mesh_shade import ADDRESS, CAPACITY, COLOR, OFFSET, ONE, ZERO, U, X, Z
-from .samples import COLOR_MASK, hit, scatter
+from .mesh_shade import DIFFUSE, diffuse_color, shade
+from .samples import hit
+from .scalars import ONE, ZERO
+from .simd import LANES, iota, lane, load, splat, store, to_float
 
 VIEWS_PER_SET = 8
+ALL = np.int32(255)
 
 
 def exact_offsets(offsets):
@@ -24,33 +26,27 @@ def exact_offsets(offsets):
     return np.array([part[len(part) // 2] for part in sets], dtype=np.float32)
 
 
-@kernel
-def shade_exact(ends, depths, at, width, shader, shading, segment, lists, ints, colors, spans):
-    """Shade the segment in every exact view; colors[place + k] is that of pixel start + k.
+@inlined
+def shade_exact(ends, depths, at, width, shader, shading, scratch):
+    """Shade the segment in every exact view; scratch.colors[place + k] is that of pixel start + k.
 
     spans (3, E) int32 become start, number and place of each view's pixels.
     """
-    material, side, geometry, gradient = shading
+    spans, colors = scratch.spans, scratch.colors
     x1, p1, x2, p2 = ends
-    filled = 0
+    filled = np.int32(0)
     for e in range(shader.exact.shape[0]):
         offset = shader.exact[e]
         start = np.int32(np.ceil(min(max(x1 + offset * p1 - at, ZERO), width)))
         end = np.int32(np.ceil(min(max(x2 + offset * p2 - at, ZERO), width)))
         spans[0, e], spans[1, e], spans[2, e] = start, max(end - start, np.int32(0)), filled
-        k = start
-        while k < end:
-            n = np.uint64(0)
-            while k < end and n < np.uint64(CAPACITY):
-                x = np.float32(k) + at
-                _, z, u = hit(x, offset, ends, depths)
-                lists[U + n], lists[Z + n], lists[X + n], lists[OFFSET + n] = u, z, x, offset
-                n += np.uint64(1)
-                k += np.int32(1)
-            shade(n, shader, material, side, geometry, gradient, segment, lists, ints)
-            for i in range(n):
-                colors[filled] = ints[COLOR + i]
-                filled += 1
+        for k in range(0, spans[1, e], LANES):
+            x = (to_float(iota()) + np.float32(start + np.int32(k))) + at
+            offsets = splat(offset)
+            _, z, u = hit(x, offsets, ends, depths)
+            color = shade(ALL, (x, z, offsets), u, shader, shading, scratch.segment, scratch.lanes)
+            store(colors, filled + np.int32(k), color)
+        filled += spans[1, e]
 
 
 @inlined
@@ -65,13 +61,18 @@ def mix(a, b, part):
 
 
 @kernel
-def take_reused(n, at, shader, lists, ints, colors, spans, counts, band):
-    """Give the listed samples remembered colours; those without one stay in the list, whose length is returned."""
-    left = np.uint64(0)
-    counts[0] += np.int64(n)
+def take_reused(seen, at, shader, lanes, chosen, colors, spans, counts):
+    """Give those of eight samples whose bit is seen remembered colours; returns the bits of those without one.
+
+    lanes: x, 1/depth and offset of the samples.
+    """
+    left = np.int32(0)
     sets = shader.exact.shape[0]
-    for i in range(n):
-        x, z, offset = lists[X + i], lists[Z + i], lists[OFFSET + i]
+    for i in range(LANES):
+        if not seen >> i & 1:
+            continue
+        x, z, offset = lanes[i], lanes[LANES + i], lanes[2 * LANES + i]
+        counts[0] += 1
         e = 0
         while e + 1 < sets and abs(shader.exact[e + 1] - offset) < abs(shader.exact[e] - offset):
             e += 1
@@ -79,26 +80,32 @@ def take_reused(n, at, shader, lists, ints, colors, spans, counts, band):
         place = x + moved - at - np.float32(spans[0, e])
         first = np.floor(place)
         k, run = np.int64(first), np.int64(spans[1, e])
-        a = np.uint64(ints[ADDRESS + i])
         if k < -1 or k >= run or run == 0:
-            lists[U + left], lists[Z + left], lists[X + left] = lists[U + i], z, x
-            lists[OFFSET + left], ints[ADDRESS + left] = offset, ints[ADDRESS + i]
-            left += np.uint64(1)
+            left |= np.int32(1 << i)
             continue
         low, high = max(k, 0), min(k + 1, run - 1)
         base = np.int64(spans[2, e])
-        color = mix(colors[base + low], colors[base + high], place - first)
-        band[a] = (band[a] & ~COLOR_MASK) | (np.int64(color) & COLOR_MASK)
+        chosen[i] = mix(colors[base + low], colors[base + high], place - first)
         counts[1] += np.int64(offset != shader.exact[e])
     return left
 
 
-@kernel
-def finish_list(n, at, shader, shading, segment, lists, ints, colors, spans, counts, band):
-    """Colour the listed samples, reusing what can be reused."""
-    material, side, geometry, gradient = shading
-    if shader.exact.shape[0] > 0:
-        n = take_reused(n, at, shader, lists, ints, colors, spans, counts, band)
-    if n > np.uint64(0):
-        shade(n, shader, material, side, geometry, gradient, segment, lists, ints)
-        scatter(n, band, ints)
+@inlined
+def shade_or_reuse(kind, reuse, seen, sample, u, at, shader, shading, scratch):
+    """Colours of those of eight samples whose bit is seen: remembered where there are, else shaded."""
+    if not reuse:
+        if kind == DIFFUSE:
+            return diffuse_color(u, shader, shading, scratch.segment)
+        return shade(seen, sample, u, shader, shading, scratch.segment, scratch.lanes)
+    x, z, offset = sample
+    store(scratch.lanes, 0, x)
+    store(scratch.lanes, LANES, z)
+    store(scratch.lanes, 2 * LANES, offset)
+    chosen = scratch.chosen
+    left = take_reused(seen, at, shader, scratch.lanes, chosen, scratch.colors, scratch.spans, scratch.counts)
+    if left != 0:
+        color = shade(left, sample, u, shader, shading, scratch.segment, scratch.lanes)
+        for i in range(LANES):
+            if left >> i & 1:
+                chosen[i] = lane(color, i)
+    return load(chosen, 0)

@@ -75,20 +75,21 @@ def project_vertices(first, last, positions, eye_from_world, camera, vertices):
 
 @kernel
 def turn_normals(first, last, normals, colors, eye_from_world, attributes):
-    """Fill attributes[first:last] = (colour, eye-space normal) for lighting per sample."""
+    """Fill attributes[first:last] = (colour, eye-space normal, 0, 0) for lighting per sample."""
     e = eye_from_world
     for i in range(first, last):
         nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
         for c in range(3):
             attributes[i, c] = colors[i, c]
             attributes[i, 3 + c] = e[c, 0] * nx + e[c, 1] * ny + e[c, 2] * nz
+        attributes[i, 6], attributes[i, 7] = 0.0, 0.0
 
 
 @kernel
 def light_vertices(first, last, scene, eye_from_world, camera, lights, attributes):
-    """Fill attributes[first:last] with light·colour and highlight (6 columns), front then, if there, back side."""
+    """Fill attributes[first:last] = (light·colour, highlight, 0, 0), of the front then, if there, of the back side."""
     e = eye_from_world
-    sides = attributes.shape[1] // 6
+    sides = attributes.shape[1] // 8
     for i in range(first, last):
         px, py, pz = scene.positions[i, 0], scene.positions[i, 1], scene.positions[i, 2]
         nx, ny, nz = scene.normals[i, 0], scene.normals[i, 1], scene.normals[i, 2]
@@ -119,13 +120,14 @@ def light_vertices(first, last, scene, eye_from_world, camera, lights, attribute
                     h = 1.0 / max(np.sqrt(hx * hx + hy * hy + hz * hz), 1e-30)
                     nh = max(sign * (ex * hx + ey * hy + ez * hz) * h, 0.0) ** material[3]
                     sr, sg, sb = sr + lights[k, 4] * nh, sg + lights[k, 5] * nh, sb + lights[k, 6] * nh
-            o = 6 * side
+            o = 8 * side
             attributes[i, o] = scene.colors[i, 0] * (material[0] + material[1] * dr)
             attributes[i, o + 1] = scene.colors[i, 1] * (material[0] + material[1] * dg)
             attributes[i, o + 2] = scene.colors[i, 2] * (material[0] + material[1] * db)
             attributes[i, o + 3] = material[2] * sr
             attributes[i, o + 4] = material[2] * sg
             attributes[i, o + 5] = material[2] * sb
+            attributes[i, o + 6], attributes[i, o + 7] = 0.0, 0.0
 
 
 @kernel
@@ -193,18 +195,18 @@ def clip_near(faces, face_ids, positions, eye_from_world, camera, vertices, attr
 
 
 @kernel
-def cull_and_count(chunk, faces, face_ids, vertices, scene, camera, span, bands, out, counts):
+def cull_and_count(chunk, faces, face_ids, vertices, scene, camera, span, bins, out, counts):
     """Keep the triangles of one chunk that some view may see, and count them per bin.
 
-    A bin is a band of rows × a block of columns; bands = (rows per band, first and last sample of a row, columns per
-    block, blocks). out[k] = (top, middle, bottom vertex, 2·face + side of the long edge, first block, last block); the
+    A bin is a row × a block of columns; bins = (first and last sample of a row, columns per block, blocks). out[k] =
+    (top, middle, bottom vertex, 2·material + side of the long edge, first and last block, first row, end row); the
     triangles of chunk (first, last) are written from out[first] on, in the order of faces. counts[bin] is increased.
 
     Culling is conservative over all camera offsets in `span`: x is affine and the signed area too, so both
     ends of the span decide. Returns the number kept.
     """
     first, last = chunk
-    rows_per_band, first_sample, last_sample, columns, blocks = bands
+    first_sample, last_sample, columns, blocks = bins
     kept = first
     scale = camera.fx / camera.focal
     for f in range(first, last):
@@ -231,8 +233,8 @@ def cull_and_count(chunk, faces, face_ids, vertices, scene, camera, span, bands,
         margin = 1.0 + 1e-6 * (abs(left) + abs(right))
         if right < -margin or left > camera.width + margin:
             continue
-        face = face_ids[f]
-        if facing == 2 and scene.materials[scene.face_material[face], 4] == 0.0:
+        material = scene.face_material[face_ids[f]]
+        if facing == 2 and scene.materials[material, 4] == 0.0:
             continue
         # sort by y; an odd permutation mirrors the triangle
         odd = 0
@@ -244,23 +246,20 @@ def cull_and_count(chunk, faces, face_ids, vertices, scene, camera, span, bands,
             a, b, ya, yb, odd = b, a, yb, ya, 1 - odd
         block0 = int(min(max((left - margin) / columns, 0.0), blocks - 1.0))
         block1 = int(min(max((right + margin) / columns, 0.0), blocks - 1.0))
-        out[kept, 0], out[kept, 1], out[kept, 2], out[kept, 3] = a, b, c, 2 * face + odd
-        out[kept, 4], out[kept, 5] = block0, block1
+        out[kept, 0], out[kept, 1], out[kept, 2], out[kept, 3] = a, b, c, 2 * material + odd
+        out[kept, 4], out[kept, 5], out[kept, 6], out[kept, 7] = block0, block1, row0, row1
         kept += 1
-        for band in range(int(row0) // rows_per_band, (int(row1) - 1) // rows_per_band + 1):
+        for row in range(int(row0), int(row1)):
             for block in range(block0, block1 + 1):
-                counts[band * blocks + block] += 1
+                counts[row * blocks + block] += 1
     return kept - first
 
 
 @kernel
-def fill_bins(first, count, triangles, vertices, height, bands, cursor, bins):
+def fill_bins(first, count, triangles, blocks, cursor, bins):
     """Write the indices of triangles first…first+count into their bins, from cursor[bin] on."""
-    rows_per_band, first_sample, last_sample, _, blocks = bands
     for k in range(first, first + count):
-        row0 = max(np.ceil(vertices[triangles[k, 0], 1] - last_sample), 0.0)
-        row1 = min(np.ceil(vertices[triangles[k, 2], 1] - first_sample), height)
-        for band in range(int(row0) // rows_per_band, (int(row1) - 1) // rows_per_band + 1):
+        for row in range(triangles[k, 6], triangles[k, 7]):
             for block in range(triangles[k, 4], triangles[k, 5] + 1):
-                bins[cursor[band * blocks + block]] = k
-                cursor[band * blocks + block] += 1
+                bins[cursor[row * blocks + block]] = k
+                cursor[row * blocks + block] += 1

@@ -1,8 +1,4 @@
-"""Shading of a list of samples that lie on one segment (one triangle in one row).
-
-Technique: all lists live in one float32 array, each in a row of fixed length STRIDE. The distance between two
-lists is then a compile-time constant, so LLVM proves that loads and stores do not overlap and every loop here
-becomes SIMD without run-time checks. Indices are unsigned: no test for Python's negative indexing.
+"""Shading of eight samples of one segment (one triangle in one row) at a time.
 
 Every colour is a direct function of (sample, camera offset): the same in single-pass, n-pass and panel draws.
 """
@@ -12,173 +8,107 @@ from __future__ import annotations
 import numpy as np
 
 from .jit import inlined, kernel
+from .mesh_light import diffuse_light, full_light, locate, unit
+from .mesh_texture import level_of_detail, texture_colors
+from .scalars import ALPHA, BYTE, HALF, ONE, ZERO
+from .simd import LANES, greater, lesser, load, splat, store, to_int
 
-STRIDE = 1040  # list capacity: 1024 + one cache line, so that lists do not fall onto the same cache set
-CAPACITY = 1024
-
-# rows of the float32 scratch: lanes of samples at hand …
-START, RUN, LANE_U, LANE_Z, LANE_X, LANE_OFFSET = (np.uint64(k * STRIDE) for k in range(6))
-# … and the list of visible samples
-U, Z, OFFSET, X = (np.uint64((6 + k) * STRIDE) for k in range(4))
-KR, KG, KB, NX, NY, NZ = (np.uint64((10 + k) * STRIDE) for k in range(6))
-DR, DG, DB, SR, SG, SB = (np.uint64((16 + k) * STRIDE) for k in range(6))
-PX, PY, PZ, LOD, TS, TT = (np.uint64((22 + k) * STRIDE) for k in range(6))
-FLOAT_ROWS = 28
-# rows of the int32 scratch
-ADDRESS, COLOR, BASE, END, PLACE = (np.uint64(k * STRIDE) for k in range(5))
-INT_ROWS = 5
-
-ZERO, HALF, ONE, BYTE = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(255.0)
-TINY = np.float32(1e-20)
-ALPHA = np.int32(-0x1000000)
-
-LIGHT_POINT = np.float32(1.0)
+PLAIN, DIFFUSE, ANY = 0, 1, 2  # colours only; normals and directional lights; whatever a material may have
 
 
 @inlined
-def whole_steps(n):
-    """A count rounded up to whole SIMD steps: what lies beyond it does no harm, a remainder would be slow."""
-    return (n + np.uint64(15)) & ~np.uint64(15)
+def attribute(segment, k, u):
+    """Attribute k at perspective parameter u; a segment is 8 attributes at its left end, then 8 differences."""
+    return u * segment[np.uint64(k + 8)] + segment[np.uint64(k)]
 
 
 @inlined
-def quantize(value):
-    """⌊255·v + ½⌋ of a value clamped to 0…1."""
-    return np.int32(min(max(value, ZERO), ONE) * BYTE + HALF)
+def to_byte(value):
+    """⌊255·v + ½⌋ of values clamped to 0…1."""
+    return to_int(lesser(greater(value, ZERO), ONE) * BYTE + HALF)
 
 
 @inlined
-def log2_fast(x):
-    """Base-2 logarithm of x > 0, relative error below 3e-7 (atanh series around 1, exact at 1)."""
-    bits = np.float32(x).view(np.int32)
-    exponent = (bits - np.int32(0x3F3504F3)) >> np.int32(23)
-    m = np.int32(bits - (exponent << np.int32(23))).view(np.float32)
-    s = (m - ONE) / (m + ONE)
-    q = s * s
-    series = np.float32(2.8853901) + q * (
-        np.float32(0.9617967) + q * (np.float32(0.5770780) + q * (np.float32(0.4121986) + q * np.float32(0.3205989)))
-    )
-    return np.float32(exponent) + s * series
+def pack(r, g, b):
+    """RGBA bytes."""
+    return to_byte(r) | (to_byte(g) << np.int32(8)) | (to_byte(b) << np.int32(16)) | ALPHA
 
 
 @inlined
-def exp2_fast(x):
-    """2 to the power x ≤ 0, relative error below 2e-7."""
-    x = max(x, np.float32(-120.0))
-    whole = np.floor(x)
-    f = x - whole
-    p = np.float32(0.00124673764) + f * np.float32(0.000216138082)
-    p = np.float32(0.0554852202) + f * (np.float32(0.00967553263) + f * p)
-    p = ONE + f * (np.float32(0.693147042) + f * (np.float32(0.240229325) + f * p))
-    return np.int32((np.int32(whole) + np.int32(127)) << np.int32(23)).view(np.float32) * p
+def to_levels(segment):
+    """Turn a segment's attributes into levels of 0…255, with ½ added, so that a sample need not."""
+    start, step = load(segment, 0), load(segment, LANES)
+    store(segment, 0, start * BYTE + HALF)
+    store(segment, LANES, step * BYTE)
 
 
-@kernel
-def interpolate(n, segment, k, row, lists):
-    """List `row` = attribute k of the segment."""
-    first, step = segment[k], segment[k + 16]
-    for i in range(n):
-        lists[row + i] = first + lists[U + i] * step
+@inlined
+def level(segment, k, u):
+    """Attribute k of a segment of levels as bytes, clamped."""
+    return to_int(lesser(greater(attribute(segment, k, u), ZERO), BYTE))
 
 
-@kernel
-def normalize_normals(n, sign, lists):
-    """Normals to unit length, turned towards the viewer on back sides (sign −1)."""
-    for i in range(n):
-        x, y, z = lists[NX + i], lists[NY + i], lists[NZ + i]
-        scale = sign / np.sqrt(max(x * x + y * y + z * z, TINY))
-        lists[NX + i] = x * scale
-        lists[NY + i] = y * scale
-        lists[NZ + i] = z * scale
+@inlined
+def plain_color(u, segment):
+    """Interpolated colour of a segment of levels as RGBA bytes."""
+    return level(segment, 0, u) | (level(segment, 1, u) << np.int32(8)) | (level(segment, 2, u) << np.int32(16)) | ALPHA
 
 
-@kernel
-def locate(n, row, lists):
-    """Eye-space positions relative to the centre camera: P = (X, Y, depth) of every sample.
+@inlined
+def diffuse_color(u, shader, shading, segment):
+    """Colour under directional lights without highlights, as RGBA bytes; see `shade`."""
+    (ambient, diffuse, _, _, _), side, _ = shading
+    lights, sign = shader.lights, ONE - np.float32(2 * side)
+    x, y, z = unit(attribute(segment, 3, u), attribute(segment, 4, u), attribute(segment, 5, u))
+    dr, dg, db = splat(ZERO), splat(ZERO), splat(ZERO)
+    for k in range(lights.shape[0]):
+        r, g, b = diffuse_light((x * sign, y * sign, z * sign), lights, k)
+        dr, dg, db = dr + r, dg + g, db + b
+    r, g, b = attribute(segment, 0, u), attribute(segment, 1, u), attribute(segment, 2, u)
+    return pack(r * (dr * diffuse + ambient), g * (dg * diffuse + ambient), b * (db * diffuse + ambient))
 
-    `row` = (1/fx, W/2, 1/focal, Y/depth without lens offset, lens offset, focal).
-    """
-    inverse_fx, centre, inverse_focal, slope, lens, focal = row
-    for i in range(n):
-        offset = lists[OFFSET + i]
-        depth = focal / lists[Z + i]
-        lists[PX + i] = depth * ((lists[X + i] - centre) * inverse_fx - offset * inverse_focal) + offset
-        lists[PY + i] = depth * slope + lens
-        lists[PZ + i] = depth
 
-
-@kernel
-def add_light(n, k, lights, highlight, view, lists):
-    """Add light k to the diffuse and specular sums.
-
-    highlight = (specular, shininess); view = (1 for each sample's own eye or 0 for the centre's, lens offset).
-    """
-    point = lights[k, 0] == LIGHT_POINT
-    lx, ly, lz = lights[k, 1], lights[k, 2], lights[k, 3]
-    r, g, b = lights[k, 4], lights[k, 5], lights[k, 6]
-    own, lens = view
+@inlined
+def lit(sample, normal, shader, highlight, row):
+    """Sums of diffuse and of specular light; sample = (x, 1/depth, offset), highlight = (specular, shininess)."""
+    (x, z, offset), lights = sample, shader.lights
     specular, shininess = highlight
-    if not point and specular == ZERO:
-        for i in range(n):
-            nl = max(lists[NX + i] * lx + lists[NY + i] * ly + lists[NZ + i] * lz, ZERO)
-            lists[DR + i] += r * nl
-            lists[DG + i] += g * nl
-            lists[DB + i] += b * nl
-        return
-    p = ONE if point else ZERO
-    for i in range(n):
-        px, py, pz = lists[PX + i], lists[PY + i], lists[PZ + i]
-        nx, ny, nz = lists[NX + i], lists[NY + i], lists[NZ + i]
-        tx, ty, tz = lx - p * px, ly - p * py, lz - p * pz
-        scale = ONE / np.sqrt(max(tx * tx + ty * ty + tz * tz, TINY))
-        tx, ty, tz = tx * scale, ty * scale, tz * scale
-        nl = max(nx * tx + ny * ty + nz * tz, ZERO)
-        vx, vy = own * lists[OFFSET + i] - px, lens - py
-        scale = ONE / np.sqrt(max(vx * vx + vy * vy + pz * pz, TINY))
-        hx, hy, hz = tx + vx * scale, ty + vy * scale, tz - pz * scale
-        scale = ONE / np.sqrt(max(hx * hx + hy * hy + hz * hz, TINY))
-        nh = max((nx * hx + ny * hy + nz * hz) * scale, TINY)
-        shine = exp2_fast(shininess * log2_fast(min(nh, ONE)))
-        shine = shine if nl > ZERO else ZERO
-        lists[DR + i] += r * nl
-        lists[DG + i] += g * nl
-        lists[DB + i] += b * nl
-        lists[SR + i] += r * shine
-        lists[SG + i] += g * shine
-        lists[SB + i] += b * shine
+    dr, dg, db = splat(ZERO), splat(ZERO), splat(ZERO)
+    sr, sg, sb = splat(ZERO), splat(ZERO), splat(ZERO)
+    place = locate(x, z, offset, row)
+    eye = (offset * shader.own_eye, splat(row[4]))
+    for k in range(lights.shape[0]):
+        r, g, b, hr, hg, hb = full_light(normal, place, eye, lights, k, shininess)
+        dr, dg, db = dr + r, dg + g, db + b
+        sr, sg, sb = sr + hr, sg + hg, sb + hb
+    return dr, dg, db, sr * specular, sg * specular, sb * specular
 
 
 @kernel
-def clear_sums(n, lists):
-    """Set the sums of light to zero."""
-    for i in range(n):
-        lists[DR + i] = ZERO
-        lists[DG + i] = ZERO
-        lists[DB + i] = ZERO
-        lists[SR + i] = ZERO
-        lists[SG + i] = ZERO
-        lists[SB + i] = ZERO
+def shade(seen, sample, u, shader, shading, segment, lanes):
+    """Colours of eight samples as RGBA bytes, of those whose bit is seen.
 
-
-@kernel
-def modulate(n, ambient, diffuse, specular, lists):
-    """Colour k·(ambient + diffuse·D) and highlight specular·S, in place of the sums."""
-    for i in range(n):
-        lists[KR + i] *= ambient + diffuse * lists[DR + i]
-        lists[KG + i] *= ambient + diffuse * lists[DG + i]
-        lists[KB + i] *= ambient + diffuse * lists[DB + i]
-        lists[SR + i] *= specular
-        lists[SG + i] *= specular
-        lists[SB + i] *= specular
-
-
-@kernel
-def pack(n, lists, ints):
-    """Quantised colours k + s as RGBA bytes in an int32."""
-    for i in range(n):
-        ints[COLOR + i] = (
-            quantize(lists[KR + i] + lists[SR + i])
-            | (quantize(lists[KG + i] + lists[SG + i]) << np.int32(8))
-            | (quantize(lists[KB + i] + lists[SB + i]) << np.int32(16))
-            | ALPHA
-        )
+    sample = (x, focal/depth, offset); u: perspective parameter in the segment; shading = (material, side, detail);
+    material = (ambient, diffuse, specular, shininess, texture); detail: row_geometry, then uv_gradient; lanes: scratch.
+    """
+    (ambient, diffuse, specular, shininess, texture), side, detail = shading
+    x, z, offset = sample
+    r, g, b = attribute(segment, 0, u), attribute(segment, 1, u), attribute(segment, 2, u)
+    if texture >= ZERO:
+        t, levels = np.int64(texture), shader.texture_levels
+        place = (attribute(segment, 6, u), attribute(segment, 7, u))
+        size = (np.float32(levels[t, 0, 1]), np.float32(levels[t, 0, 2]))
+        lod = level_of_detail(offset, z, place, detail, size)
+        top = shader.level_count[t] - 1
+        texture_colors(seen, place, lod, shader.texels, levels[t], top, lanes)
+        r, g, b = r * load(lanes, 0), g * load(lanes, 8), b * load(lanes, 16)
+    nx, ny, nz = attribute(segment, 3, u), attribute(segment, 4, u), attribute(segment, 5, u)
+    if not shader.per_sample:
+        return pack(r + nx, g + ny, b + nz)  # lit at the vertices: the other three are highlights
+    nx, ny, nz = unit(nx, ny, nz)
+    sign = ONE - np.float32(2 * side)
+    row = (detail[0], detail[1], detail[2], detail[3], detail[4], detail[5])
+    normal = (nx * sign, ny * sign, nz * sign)
+    dr, dg, db, sr, sg, sb = lit((x, z, offset), normal, shader, (specular, shininess), row)
+    r, g, b = r * (dr * diffuse + ambient), g * (dg * diffuse + ambient), b * (db * diffuse + ambient)
+    return pack(r + sr, g + sg, b + sb)

@@ -5,28 +5,29 @@ from __future__ import annotations
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_shade import HALF, KB, KG, KR, LOD, OFFSET, ONE, TINY, TS, TT, ZERO, Z, log2_fast
+from .mesh_light import log2_lanes
+from .scalars import HALF, ONE, TINY, ZERO
+from .simd import LANES, floor, greater, lesser, store
 
 BYTE_SCALE = np.float32(1.0 / 255.0)
 
 
-@kernel
-def level_of_detail(n, gradient, size, lists):
+@inlined
+def level_of_detail(offset, z, place, detail, size):
     """λ = log2 ρ of every sample, ρ the larger of the lengths of ∂(s, t)/∂x and ∂(s, t)/∂y in texels.
 
-    `gradient`: of 1/depth, s/depth and t/depth: numerators along x (3), along y at offset 0 (3) and per unit of
+    detail[6:]: of 1/depth, s/depth and t/depth: numerators along x (3), along y at offset 0 (3) and per unit of
     offset (3), and the triangle's doubled area at offset 0 and per unit of offset.
     """
-    zx, sx, tx, zy, sy, ty, zo, so, to, area, area_o = gradient
-    width, height = size
-    for i in range(n):
-        offset, s, t = lists[OFFSET + i], lists[TS + i], lists[TT + i]
-        scale = ONE / ((area + offset * area_o) * lists[Z + i])
-        z_y, s_y, t_y = zy + offset * zo, sy + offset * so, ty + offset * to
-        ax, bx = (sx - s * zx) * scale * width, (tx - t * zx) * scale * height
-        ay, by = (s_y - s * z_y) * scale * width, (t_y - t * z_y) * scale * height
-        square = max(ax * ax + bx * bx, ay * ay + by * by)
-        lists[LOD + i] = HALF * log2_fast(min(max(square, TINY), np.float32(1e20)))
+    zx, sx, tx, zy, sy, ty = detail[6], detail[7], detail[8], detail[9], detail[10], detail[11]
+    zo, so, to, area, area_o = detail[12], detail[13], detail[14], detail[15], detail[16]
+    (s, t), (width, height) = place, size
+    scale = ONE / ((offset * area_o + area) * z)
+    z_y, s_y, t_y = offset * zo + zy, offset * so + sy, offset * to + ty
+    ax, bx = (s * -zx + sx) * scale * width, (t * -zx + tx) * scale * height
+    ay, by = (s_y - s * z_y) * scale * width, (t_y - t * z_y) * scale * height
+    square = greater(ax * ax + bx * bx, ay * ay + by * by)
+    return log2_lanes(lesser(greater(square, TINY), np.float32(1e20))) * HALF
 
 
 @inlined
@@ -62,20 +63,31 @@ def bilinear(texels, first, width, height, s, t):
 
 
 @kernel
-def modulate_by_texture(n, texels, texture, levels, top, lists):
-    """Multiply the colour lists by the trilinear texture colour; levels (T, L, 3): first texel, width, height."""
-    for i in range(n):
-        s, t, lod = lists[TS + i], lists[TT + i], lists[LOD + i]
-        s, t = s - np.floor(s), t - np.floor(t)
-        lod = lod if lod > ZERO else ZERO  # NaN too, where a triangle is seen edge-on
-        lod = min(lod, np.float32(top))
-        fine = min(np.int64(lod), top)
-        part = lod - np.float32(fine)
-        r, g, b = bilinear(texels, levels[texture, fine, 0], levels[texture, fine, 1], levels[texture, fine, 2], s, t)
-        if part > ZERO:
-            k = fine + 1
-            r1, g1, b1 = bilinear(texels, levels[texture, k, 0], levels[texture, k, 1], levels[texture, k, 2], s, t)
-            r, g, b = r + part * (r1 - r), g + part * (g1 - g), b + part * (b1 - b)
-        lists[KR + i] *= r
-        lists[KG + i] *= g
-        lists[KB + i] *= b
+def texture_color(s, t, lod, texels, levels, top, lanes, k):
+    """Trilinear colour of one sample into lanes[k], lanes[8 + k], lanes[16 + k].
+
+    levels (L, 3): first texel, width, height; top: the last level.
+    """
+    lod = lod if lod > ZERO else ZERO  # NaN too, where a triangle is seen edge-on
+    lod = min(lod, np.float32(top))
+    fine = min(np.int64(lod), top)
+    part = lod - np.float32(fine)
+    r, g, b = bilinear(texels, levels[fine, 0], levels[fine, 1], levels[fine, 2], s, t)
+    if part > ZERO:
+        fine += 1
+        r1, g1, b1 = bilinear(texels, levels[fine, 0], levels[fine, 1], levels[fine, 2], s, t)
+        r, g, b = r + part * (r1 - r), g + part * (g1 - g), b + part * (b1 - b)
+    k = np.uint64(k)
+    lanes[k], lanes[k + np.uint64(8)], lanes[k + np.uint64(16)] = r, g, b
+
+
+@inlined
+def texture_colors(seen, place, lod, texels, levels, top, lanes):
+    """Trilinear colours of eight samples at (s, t) into lanes[:24], red, green, blue; of those whose bit is seen."""
+    s, t = place
+    store(lanes, 0, s - floor(s))
+    store(lanes, LANES, t - floor(t))
+    store(lanes, 2 * LANES, lod)
+    for k in range(LANES):
+        if seen >> k & 1:
+            texture_color(lanes[k], lanes[LANES + k], lanes[2 * LANES + k], texels, levels, top, lanes, k)

@@ -1,9 +1,8 @@
-"""Meshes to a stack of views: a block of rows and columns of every view at a time, in cache.
+"""Meshes to a stack of views: a row of a block of columns of every view at a time, in cache.
 
-For each triangle and row, its segment (mesh_raster) is drawn into all views before the next: the pixels that it covers
-in each view (SIMD over views), then the first covered sample of every view, the second, and so on: depth, colour
-(SIMD over views), then one scalar pass that keeps what is nearer. Dearer shading collects the visible samples of the
-segment in lists first, so that it is SIMD over visible samples only.
+For each triangle that meets the row, its segment (mesh_raster) is drawn into all views before the next, eight views at
+a time (SIMD over views): the pixels that it covers in each; then the first two covered samples of every view, the next
+two, and so on: depth and colour, and one pass over views that keeps what is nearer.
 """
 
 from __future__ import annotations
@@ -13,109 +12,32 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_block import draw_block
-from .mesh_reuse import finish_list, shade_exact
-from .mesh_shade import (
-    ADDRESS,
-    BASE,
-    CAPACITY,
-    LANE_U,
-    LANE_Z,
-    OFFSET,
-    RUN,
-    START,
-    ZERO,
-    U,
-    X,
-    Z,
-    whole_steps,
+from .mesh_block import draw_row
+from .mesh_reuse import shade_exact, shade_or_reuse
+from .mesh_shade import PLAIN, plain_color, to_levels
+from .samples import (
+    COLOR_MASK,
+    DEPTH_SHIFT,
+    EMPTY,
+    clear_samples,
+    colors_of,
+    depth_bits,
+    hit,
+    keep_nearer_pairs,
+    store_pairs,
 )
-from .samples import COLOR_MASK, DEPTH_SHIFT, clear_samples, hit, nearer, plain_color, word
-
-VIEWS_AT_ONCE = 512  # leaves the lists room for the samples of two steps
-
-
-@inlined
-def find_runs(views, first_view, ends, block, offsets, lists, ints):
-    """First covered pixel, number of covered pixels and its place in the band for each view; returns the longest run.
-
-    block = (first column, end column, sample_x, place of the row in the band, words from view to view).
-    """
-    x1, p1, x2, p2 = ends
-    low, high, sample_x, row, stride = block
-    lanes = whole_steps(views)
-    for v in range(lanes):
-        offset = offsets[first_view + v]
-        start = min(max(np.ceil(x1 + offset * p1 - sample_x), low), high)
-        end = min(max(np.ceil(x2 + offset * p2 - sample_x), low), high)
-        lists[START + v] = start
-        lists[RUN + v] = end - start
-    for v in range(lanes):  # in 32 bits: SIMD has no quick product of 64
-        ints[BASE + v] = np.int32(np.int32(np.int32(v) * stride) + np.int32(row + np.int32(lists[START + v] - low)))
-    longest = np.int32(0)
-    for v in range(lanes):
-        longest = max(longest, np.int32(lists[RUN + v]))
-    return longest
-
-
-@inlined
-def make_words(views, first_view, k, sample_x, ends, depths, color, offsets, lists, words):
-    """The k-th covered sample of each view, with its interpolated colour; 0 beyond a view's run."""
-    step = np.float32(k)
-    at = step + sample_x
-    for v in range(whole_steps(views)):
-        _, z, u = hit(lists[START + v] + at, offsets[first_view + v], ends, depths)
-        words[np.uint64(2) * v] = plain_color(u, color)
-        words[np.uint64(2) * v + np.uint64(1)] = np.float32(z if step < lists[RUN + v] else ZERO).view(np.int32)
-
-
-@inlined
-def keep_nearer(views, k, ints, words, band):
-    """Depth test and store of one sample per view."""
-    for v in range(views):
-        a = np.uint64(ints[BASE + v] + k)
-        old, new = band[a], words[v]
-        band[a] = new if nearer(new, old) else old
-
-
-@inlined
-def list_visible(views, first_view, k, n, at, offsets, lists, ints, band):
-    """Depth test of one sample per view; the visible ones join the list, whose new length is returned."""
-    for v in range(views):
-        a = np.uint64(ints[BASE + v] + k)
-        old = band[a]
-        z = lists[LANE_Z + v]
-        new = word(z, np.int32(0))
-        visible = nearer(new, old)
-        band[a] = new if visible else old
-        ints[ADDRESS + n] = np.int32(a)
-        lists[U + n] = lists[LANE_U + v]
-        lists[Z + n] = z
-        lists[X + n] = lists[START + v] + at
-        lists[OFFSET + n] = offsets[first_view + v]
-        n += np.uint64(visible)
-    return n
-
-
-@inlined
-def test_lanes(views, first_view, k, sample_x, ends, depths, offsets, lists):
-    """Inverse depth (0 beyond a view's run) and perspective parameter of the k-th covered sample of each view."""
-    step = np.float32(k)
-    at = step + sample_x
-    for v in range(whole_steps(views)):
-        _, z, u = hit(lists[START + v] + at, offsets[first_view + v], ends, depths)
-        lists[LANE_U + v] = u
-        lists[LANE_Z + v] = z if step < lists[RUN + v] else ZERO
+from .simd import LANES, ceil, gather, greater, lesser, load, mask_word, splat, store, stream, to_int
 
 
 class Place(NamedTuple):
     """What draw_segment reads of a block.
 
-    offsets (V + 15,) float32, the last one repeated, so that SIMD works in whole steps; number of views; columns
-    first … end; sample_x; width of the picture.
+    offsets (V + 7,) float32, places (V + 7,) int32: where each view's samples begin in the band, the last ones
+    repeated; number of views; columns first … end; sample_x; width of the picture.
     """
 
     offsets: np.ndarray
+    places: np.ndarray
     views: int
     first: int
     end: int
@@ -124,71 +46,97 @@ class Place(NamedTuple):
 
 
 @inlined
-def draw_segment(place, row, ends, depths, plain, shader, shading, scratch):
-    """Draw one segment in every view; shading = (material, side, row, gradient)."""
-    offsets, sample_x = place.offsets, place.sample_x
-    lists, ints, segment, band = scratch.lists, scratch.ints, scratch.segment, scratch.band
-    colors, spans, counts = scratch.colors, scratch.spans, scratch.counts
-    low, high = np.float32(place.first), np.float32(place.end)
-    stride = np.int32(place.end - place.first)
-    base = np.int32(row) * stride * np.int32(place.views)
-    color = (segment[0], segment[1], segment[2], segment[16], segment[17], segment[18])
-    if shader.exact.shape[0] > 0 and not plain:
-        shade_exact(ends, depths, sample_x, place.width, shader, shading, segment, lists, ints, colors, spans)
-    n = np.uint64(0)
-    for first in range(0, place.views, VIEWS_AT_ONCE):
-        first_view = np.uint64(first)
-        views = np.uint64(min(VIEWS_AT_ONCE, place.views - first))
-        here = (low, high, sample_x, base + np.int32(first) * stride, stride)
-        longest = find_runs(views, first_view, ends, here, offsets, lists, ints)
-        for k in range(longest):
-            if plain:
-                make_words(views, first_view, k, sample_x, ends, depths, color, offsets, lists, scratch.halves)
-                keep_nearer(views, k, ints, scratch.words, band)
-                continue
-            test_lanes(views, first_view, k, sample_x, ends, depths, offsets, lists)
-            n = list_visible(views, first_view, k, n, np.float32(k) + sample_x, offsets, lists, ints, band)
-            if n > np.uint64(CAPACITY) - views:
-                finish_list(n, sample_x, shader, shading, segment, lists, ints, colors, spans, counts, band)
-                n = np.uint64(0)
-    if n > np.uint64(0):
-        finish_list(n, sample_x, shader, shading, segment, lists, ints, colors, spans, counts, band)
+def make_samples(k, runs, sample_x, what, scratch):
+    """The k-th sample that a segment covers in each of eight views: depth (empty where it does not) and colour.
+
+    runs = (offset, first pixel, number of pixels, place in the band); what: see draw_segment.
+    """
+    offset, start, run, address = runs
+    ends, depths, kind, reuse, shader, shading = what
+    step = np.float32(k)
+    x = (start + step) + sample_x
+    _, z, u = hit(x, offset, ends, depths)
+    depth = depth_bits(run > step, z)
+    if kind == PLAIN:
+        color = plain_color(u, scratch.segment)
+    else:
+        old = gather(scratch.halves, (address + k) * np.int32(2) + np.int32(1))
+        seen = mask_word(depth > old)
+        if seen == 0:
+            return depth, splat(EMPTY)
+        color = shade_or_reuse(kind, reuse, seen, (x, z, offset), u, sample_x, shader, shading, scratch)
+    return depth, color
 
 
 @inlined
-def store_views(rows, columns, height, width, views, band, line):
+def draw_segment(place, ends, depths, kind, shader, shading, scratch):
+    """Draw one segment in every view."""
+    offsets, places, sample_x = place.offsets, place.places, place.sample_x
+    segment = scratch.segment
+    x1, p1, x2, p2 = ends
+    low, high = np.float32(place.first), np.float32(place.end)
+    reuse = shader.exact.shape[0] > 0 and kind != PLAIN
+    if kind == PLAIN:
+        to_levels(segment)
+    elif reuse:
+        shade_exact(ends, depths, sample_x, place.width, shader, shading, scratch)
+    what = (ends, depths, kind, reuse, shader, shading)
+    for view in range(0, place.views, LANES):
+        offset = load(offsets, view)
+        start = lesser(greater(ceil((offset * p1 + x1) - sample_x), low), high)
+        run = lesser(greater(ceil((offset * p2 + x2) - sample_x), low), high) - start
+        address = load(places, view) + to_int(start - low)
+        store(scratch.ints, 0, address)
+        store(scratch.ints, LANES, address)
+        runs, lanes, k = (offset, start, run, address), min(place.views - view, LANES), np.int32(0)
+        while mask_word(run > np.float32(k)) != 0:
+            first = make_samples(k, runs, sample_x, what, scratch)
+            second = make_samples(np.int32(k + 1), runs, sample_x, what, scratch)
+            store_pairs(first, second, scratch.word_halves)
+            keep_nearer_pairs(k, lanes, scratch.ints, scratch.words, scratch.band)
+            k = np.int32(k + 2)
+
+
+@inlined
+def store_views(row, columns, height, width, views, scratch, line):
     """Copy the band's colours to the pictures, which are `line`, (V·H·W,) int32."""
+    band, halves = scratch.band, scratch.halves
     k = np.uint64(0)
     count = np.uint64(columns[1] - columns[0])
-    for r in range(rows[0], rows[1]):
-        for view in range(views):
-            first = np.uint64((view * height + r) * width + columns[0])
-            for x in range(count):
-                line[first + x] = np.int32(band[k + x] & COLOR_MASK)
-            k += count
+    whole = count & ~np.uint64(LANES - 1)
+    start = line.ctypes.data
+    for view in range(views):
+        first = np.uint64((view * height + row) * width + columns[0])
+        if (start + np.uint64(4) * first) % np.uint64(16) == 0:
+            for x in range(np.uint64(0), whole, np.uint64(LANES)):
+                stream(line, first + x, colors_of(halves, k + x))
+        else:
+            for x in range(np.uint64(0), whole, np.uint64(LANES)):
+                store(line, first + x, colors_of(halves, k + x))
+        for x in range(whole, count):
+            line[first + x] = np.int32(band[k + x] & COLOR_MASK)
+        k += count
 
 
 @inlined
-def store_background(rows, columns, height, width, views, background, line):
+def store_background(row, columns, height, width, views, background, line):
     """Fill the pictures where there is nothing to draw."""
     count = np.uint64(columns[1] - columns[0])
-    for r in range(rows[0], rows[1]):
-        for view in range(views):
-            first = np.uint64((view * height + r) * width + columns[0])
-            for x in range(count):
-                line[first + x] = background
+    for view in range(views):
+        first = np.uint64((view * height + row) * width + columns[0])
+        for x in range(count):
+            line[first + x] = background
 
 
 @inlined
-def store_depth(rows, columns, focal, band, nearest, out):
+def store_depth(row, columns, focal, band, nearest, out):
     """Write eye depth (V, H, W), inf where empty; with `nearest`, keep what is nearer."""
     k = np.uint64(0)
-    for r in range(rows[0], rows[1]):
-        for view in range(out.shape[0]):
-            for x in range(columns[0], columns[1]):
-                depth = focal / np.int32(band[k] >> DEPTH_SHIFT).view(np.float32)
-                out[view, r, x] = min(depth, out[view, r, x]) if nearest else depth
-                k += np.uint64(1)
+    for view in range(out.shape[0]):
+        for x in range(columns[0], columns[1]):
+            depth = focal / np.int32(band[k] >> DEPTH_SHIFT).view(np.float32)
+            out[view, row, x] = min(depth, out[view, row, x]) if nearest else depth
+            k += np.uint64(1)
 
 
 @inlined
@@ -200,47 +148,50 @@ def add_samples(count, band, sums):
 
 
 @inlined
-def store_means(rows, columns, samples, sums, out):
+def store_means(row, columns, samples, sums, out):
     """Write the rounded means of the sums to the pictures, and clear the sums."""
     k = 0
     half = samples // 2
-    for r in range(rows[0], rows[1]):
-        for view in range(out.shape[0]):
-            for x in range(columns[0], columns[1]):
-                rgba = np.int32(0)
-                for c in range(4):
-                    rgba |= np.int32((np.int64(sums[k + c]) + half) // samples) << np.int32(8 * c)
-                    sums[k + c] = np.uint16(0)
-                out[view, r, x] = rgba
-                k += 4
+    for view in range(out.shape[0]):
+        for x in range(columns[0], columns[1]):
+            rgba = np.int32(0)
+            for c in range(4):
+                rgba |= np.int32((np.int64(sums[k + c]) + half) // samples) << np.int32(8 * c)
+                sums[k + c] = np.uint16(0)
+            out[view, row, x] = rgba
+            k += 4
 
 
 @kernel
 def draw_views(bins, surface, camera, shader, offsets, background, side, scratch, out, depth):
-    """Draw bins (first, end, rows per band, blocks a row, columns per block) of every view into out (V, H, W) int32.
+    """Draw bins (first, end, blocks a row, columns per block) of every view into out (V, H, W) int32.
 
     side² samples a pixel; depth (V, H, W) float32, or of no size when it is not wanted.
     """
     views, height, width = out.shape
     line = out.reshape(-1)
+    span = (offsets[0], offsets[views - 1])
+    places = np.empty(offsets.shape[0], np.int32)
     for k in range(bins[0], bins[1]):
-        first_row, first_column = k // bins[3] * bins[2], k % bins[3] * bins[4]
-        rows = (first_row, min(first_row + bins[2], height))
-        columns = (first_column, min(first_column + bins[4], width))
+        row, first = k // bins[2], k % bins[2] * bins[3]
+        columns = (first, min(first + bins[3], width))
         if surface.bin_start[k] == surface.bin_start[k + 1] and depth.size == 0:
-            store_background(rows, columns, height, width, views, background, line)
+            store_background(row, columns, height, width, views, background, line)
             continue
-        count = (rows[1] - rows[0]) * views * (columns[1] - columns[0])
+        count = columns[1] - columns[0]
+        for v in range(places.shape[0]):
+            places[v] = min(v, views - 1) * count
         for s in range(side * side):
-            clear_samples(count, background, scratch.band)
+            clear_samples(0, views * count, background, scratch.halves)
             sample = ((s % side + 0.5) / side, (s // side + 0.5) / side)
-            place = Place(offsets, views, columns[0], columns[1], np.float32(sample[0]), np.float32(width))
-            draw_block(draw_segment, place, rows, k, surface, camera, shader, sample, scratch)
+            at, wide = np.float32(sample[0]), np.float32(width)
+            place = Place(offsets, places, views, columns[0], columns[1], at, wide)
+            draw_row(draw_segment, place, span, row, k, surface, camera, shader, sample, scratch)
             if side > 1:
-                add_samples(count, scratch.band, scratch.sums)
+                add_samples(views * count, scratch.band, scratch.sums)
             if depth.size > 0:
-                store_depth(rows, columns, np.float32(camera.focal), scratch.band, s > 0, depth)
+                store_depth(row, columns, np.float32(camera.focal), scratch.band, s > 0, depth)
         if side > 1:
-            store_means(rows, columns, side * side, scratch.sums, out)
+            store_means(row, columns, side * side, scratch.sums, out)
         else:
-            store_views(rows, columns, height, width, views, scratch.band, line)
+            store_views(row, columns, height, width, views, scratch, line)

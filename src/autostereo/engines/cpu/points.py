@@ -16,8 +16,8 @@ from .memory import Memory
 from .mesh import new_block, panel_lines
 from .mesh_panel import Panel
 from .mesh_setup import CameraNumbers, camera_numbers
-from .mesh_shade import FLOAT_ROWS, INT_ROWS, STRIDE
 from .panel_lines import line_capacity
+from .panel_list import STRIDE
 from .points_block import Splats
 from .points_panel import PLANE as PANEL_PLANE
 from .points_panel import PLANES as PANEL_PLANES
@@ -27,6 +27,7 @@ from .points_views import PAD, PLANE, PLANES, VIEWS_AT_ONCE, Scratch, row_sample
 from .scene_arrays import light_array
 from .threads import run_rows
 
+LIST_ROWS = 8  # most rows of float32 lists that a draw of points needs
 SAMPLES = 12_000  # of a block of views: with what else a block touches they stay in L2
 PANEL_SAMPLES = 12_288  # of a block of a panel, likewise
 PANEL_COLUMNS = 2048  # most pixels of a panel's block
@@ -123,7 +124,7 @@ def panel_grid(width: int, height: int) -> Grid:
 def new_scratch(samples: int) -> Scratch:
     """One thread's memory."""
     return Scratch(
-        np.zeros(samples, np.float32), np.zeros(FLOAT_ROWS * STRIDE, np.float32), np.zeros(INT_ROWS * STRIDE, np.int32)
+        np.zeros(samples, np.float32), np.zeros(LIST_ROWS * STRIDE, np.float32), np.zeros(2 * STRIDE, np.int32)
     )
 
 

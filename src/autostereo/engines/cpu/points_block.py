@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined
-from .mesh_shade import HALF, ONE, ZERO
 from .points_chord import cut, lens_of
 from .points_setup import DEPTH, INVERSE, MATERIAL, PARTS, REACH, ROW0, ROW1, A, X
+from .scalars import HALF, ONE, ZERO
 
 BEFORE, BEHIND, BLEND = 0, 1, 2  # stages, see draw_surfels
 TWO, WIDE = np.float32(2.0), np.float32(1e9)

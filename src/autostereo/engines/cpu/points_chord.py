@@ -19,8 +19,8 @@ from __future__ import annotations
 import numpy as np
 
 from .jit import inlined
-from .mesh_shade import ONE, TINY, ZERO, exp2_fast, log2_fast
 from .points_setup import BACK, BARE, DEPTH, INVERSE, LEAST_RADIUS, ND, NX, NY, REACH, SMALL, A, B, X, Y
+from .scalars import ONE, TINY, ZERO, exp2_fast, log2_fast
 
 FOUR, HALF, QUARTER = np.float32(4.0), np.float32(0.5), np.float32(0.25)
 LEAST = np.float32(LEAST_RADIUS)

@@ -12,26 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_panel import LINES_AT_ONCE, Block, find_intervals, place_samples
-from .mesh_shade import (
-    ADDRESS,
-    BASE,
-    CAPACITY,
-    KR,
-    LANE_OFFSET,
-    LANE_U,
-    LANE_X,
-    LANE_Z,
-    ONE,
-    RUN,
-    ZERO,
-    quantize,
-    whole_steps,
-)
-from .panel_lines import BUCKET, LinePlan, make_lines, row_offsets
+from .panel_lines import LinePlan, make_lines, row_offsets
+from .panel_list import ADDRESS, COLOR, LANE_OFFSET, LANE_U, LANE_X, LANE_Z, Block, draw_stretch, place_samples
 from .points_block import BLEND, draw_surfels, middle_depth, swath
 from .points_chord import depth_of, is_small, light_at, shine_of, weight_of
 from .points_setup import BLUE, DEPTH, FRONT, GREEN, ND, NX, NY, REACH, RED, SMALL, A, B
+from .scalars import ONE, ZERO, quantize, whole_steps
 
 PLANE = np.uint64(12288 + 5 * 16)  # samples of a block; planes must not fall onto the same cache sets
 NEAREST, STOP, WEIGHT, SUM, LAST, FARTHEST = (PLANE * np.uint64(k) for k in range(6))
@@ -99,7 +85,7 @@ def list_colors(n, row, place, record, material, lists, ints):
     r, g, b = record[RED], record[GREEN], record[BLUE]
     for i in range(n):
         k = np.int32(ints[ADDRESS + i] - begin)
-        lists[KR + i] = r if k < green else (g if k < blue else b)
+        lists[COLOR + i] = r if k < green else (g if k < blue else b)
     specular, shininess, lights = place.materials[material, 2], place.materials[material, 3], place.lights
     if specular == ZERO or not place.own_eye:
         return
@@ -114,7 +100,7 @@ def list_colors(n, row, place, record, material, lists, ints):
         for i in range(n):
             shine = shine_of(lists[LANE_OFFSET + i], centre, normal, light, shininess)
             k = np.int32(ints[ADDRESS + i] - begin)
-            lists[KR + i] += shine * (r if k < green else (g if k < blue else b))
+            lists[COLOR + i] += shine * (r if k < green else (g if k < blue else b))
 
 
 @inlined
@@ -140,17 +126,15 @@ def add_weights(n, number, reach, lists, ints, planes):
         seen &= np.float32(last).view(np.int32) != number
         weight = lists[LANE_U + i] if seen else ZERO
         planes[WEIGHT + a] += weight
-        planes[SUM + a] += weight * lists[KR + i]
+        planes[SUM + a] += weight * lists[COLOR + i]
         planes[LAST + a] = mark if seen else last
 
 
 @inlined
-def draw_listed(n, place, blending, row, surfel, chord, scratch):
-    """Draw a chord at the listed samples."""
-    record, number, part, parts, material, lens = surfel
+def draw_listed(n, place, row, ends, what, scratch):
+    """Draw a chord at the listed samples; what = (blending, surfel, chord)."""
+    blending, (record, number, part, parts, material, lens), chord = what
     lists, ints, planes = scratch.lists, scratch.ints, scratch.planes
-    for i in range(16):  # whole SIMD steps
-        ints[ADDRESS + n + np.uint64(i)] = np.int32(row) * np.int32(3) * np.int32(place.columns)
     whole = whole_steps(n)
     place_samples(whole, row, place, lists, ints)
     if blending:
@@ -186,31 +170,7 @@ def is_hidden(place, nearest, record, lens, rows, scratch):
 @inlined
 def draw_chord(place, blending, row, surfel, chord, done, scratch):
     """Draw one chord in every sub-pixel: its depths or, `blending`, its colours where it is seen. See draw_surfels."""
-    lists, ints = scratch.lists, scratch.ints
-    plan = place.plan
-    low, high = np.float32(plan.low), np.float32(plan.high)
-    x1, p1, x2, p2 = chord[0], chord[1], chord[2], chord[3]
-    left = min(x1 + low * p1, x1 + high * p1) - np.float32(2.0)
-    right = max(x2 + low * p2, x2 + high * p2) + np.float32(1.0)
-    first, columns = np.float32(place.first), np.float32(place.columns)
-    if right < first or left > first + columns:
-        return 0
-    left, right = max(left - first, ZERO), min(right - first, columns - ONE)
-    starts = place.block.starts[row]
-    line = starts[np.int64(max(left - np.float32(plan.reach), ZERO)) >> BUCKET]
-    stop = starts[(np.int64(right) >> BUCKET) + 1]
-    n, period = np.uint64(0), np.int32(plan.period)
-    while line < stop:
-        count = np.uint64(min(stop - line, LINES_AT_ONCE))
-        most = max(find_intervals(np.uint64(line), count, row, (x1, p1, x2, p2), place, lists, ints), np.int32(1))
-        line += np.int64(count)
-        for k in range(most):
-            for i in range(count):
-                ints[ADDRESS + n] = ints[BASE + i] + np.int32(k) * period
-                n += np.uint64(lists[RUN + i] > np.float32(k))
-            if n > np.uint64(CAPACITY - LINES_AT_ONCE) or (line == stop and k + 1 == most and n > np.uint64(0)):
-                draw_listed(n, place, blending, row, surfel, chord, scratch)
-                n = np.uint64(0)
+    draw_stretch(draw_listed, place, row, (chord[0], chord[1], chord[2], chord[3]), (blending, surfel, chord), scratch)
     return 0
 
 

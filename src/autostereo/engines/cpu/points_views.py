@@ -14,10 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_shade import ALPHA, HALF, ONE, STRIDE, ZERO, quantize, whole_steps
+from .panel_list import STRIDE
 from .points_block import BLEND, CLOSER, TWO, draw_surfels, middle_depth, swath
 from .points_chord import depth_of, is_small, light_at, shine_of, weight_of
 from .points_setup import BLUE, DEPTH, FRONT, GREEN, ND, NX, NY, REACH, RED, SMALL, A, B
+from .scalars import ALPHA, HALF, ONE, ZERO, quantize, whole_steps
 
 VIEWS_AT_ONCE = 256
 SMALL_MADE, COLORS_MADE = 1, 2

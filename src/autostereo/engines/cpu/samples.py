@@ -1,4 +1,4 @@
-"""Samples: what is the same in every draw, and how a sample is kept.
+"""Samples: what is the same in every draw of meshes, and how a sample is kept.
 
 A sample is one 64-bit word: the bits of its inverse depth above, its colour (RGBA) below; 0 above is empty.
 Positive floats order like integers, so depth test, depth and colour are one comparison and one store.
@@ -8,61 +8,109 @@ from __future__ import annotations
 
 import numpy as np
 
-from .jit import inlined, kernel
-from .mesh_shade import ADDRESS, ALPHA, COLOR, ONE, quantize
+from .jit import inlined
+from .scalars import ONE
+from .simd import (
+    LANES,
+    bits,
+    even_lanes,
+    first_fours,
+    high_halves,
+    high_pairs,
+    iota,
+    keep_greater,
+    last_fours,
+    load,
+    low_halves,
+    low_pairs,
+    select,
+    splat,
+    store,
+)
 
 DEPTH_SHIFT = np.int64(32)
 COLOR_MASK = np.int64(0xFFFFFFFF)
+EMPTY = np.int32(0)
+PAIR = (0, 4, 8, 12, 2, 6, 10, 14)  # place of a lane's two words
 
 
 @inlined
 def hit(x, offset, ends, depths):
-    """Whether a segment covers the sample at x of the camera at `offset`, its inverse depth and perspective parameter.
+    """Which of eight samples a segment covers from the cameras at `offset`, inverse depths, perspective parameters.
 
     With w = right − left and n = x − left: 1/depth = z1 + (n/w)·(z2 − z1) = q/w for q = z1·w + n·(z2 − z1), and
     the parameter is u = n·z2/q; one division serves both. Every draw uses this one expression.
     """
     x1, p1, x2, p2 = ends
     z1, z2 = depths
-    left = x1 + offset * p1
-    right = x2 + offset * p2
+    left = offset * p1 + x1
+    right = offset * p2 + x2
     w = right - left
     n = x - left
-    q = z1 * w + n * (z2 - z1)
+    q = w * z1 + n * (z2 - z1)
     r = ONE / (w * q)
     return (left <= x) & (x < right), q * q * r, n * z2 * (w * r)
 
 
 @inlined
-def plain_color(u, color):
-    """Interpolated colour as RGBA bytes; color = (r, g, b at the left end, differences to the right end)."""
-    r, g, b, dr, dg, db = color
-    return quantize(r + u * dr) | (quantize(g + u * dg) << np.int32(8)) | (quantize(b + u * db) << np.int32(16)) | ALPHA
+def depth_bits(covered, z):
+    """The upper half of words of samples: the bits of the inverse depth where covered, else empty."""
+    return select(covered, bits(z), EMPTY)
 
 
 @inlined
-def word(z, color):
-    """A sample's word."""
-    return (np.int64(np.float32(z).view(np.int32)) << DEPTH_SHIFT) | (np.int64(color) & COLOR_MASK)
+def store_words(depth, color, word_halves):
+    """Eight words in order, from their halves."""
+    low, high = low_halves(color, depth), high_halves(color, depth)
+    store(word_halves, 0, first_fours(low, high))
+    store(word_halves, LANES, last_fours(low, high))
 
 
 @inlined
-def nearer(new, old):
-    """Whether a sample is strictly nearer than another: of equally near ones the earlier stays."""
-    return new > (old | COLOR_MASK)
+def keep_nearer(a, new, band):
+    """Depth test and store of one sample: strictly nearer; of equally near ones the earlier stays."""
+    old = band[a]
+    band[a] = new if new > (old | COLOR_MASK) else old
 
 
 @inlined
-def scatter(n, band, ints):
-    """Write the colours of the sample lists into the band."""
-    for i in range(n):
-        a = np.uint64(ints[ADDRESS + i])
-        band[a] = (band[a] & ~COLOR_MASK) | (np.int64(ints[COLOR + i]) & COLOR_MASK)
+def store_pairs(first, second, word_halves):
+    """Words of two samples of each of eight lanes, side by side at PAIR[lane]; first, second: halves (depth, color)."""
+    (depth, color), (depth2, color2) = first, second
+    low, high = low_halves(color, depth), high_halves(color, depth)
+    low2, high2 = low_halves(color2, depth2), high_halves(color2, depth2)
+    store(word_halves, 0, low_pairs(low, low2))
+    store(word_halves, LANES, high_pairs(low, low2))
+    store(word_halves, 2 * LANES, low_pairs(high, high2))
+    store(word_halves, 3 * LANES, high_pairs(high, high2))
 
 
-@kernel
-def clear_samples(count, background, band):
-    """Empty samples: infinitely far, the background's colour."""
-    empty = np.int64(background) & COLOR_MASK
-    for k in range(np.uint64(count)):
-        band[k] = empty
+@inlined
+def keep_nearer_pairs(k, lanes, addresses, words, band):
+    """Depth test and store of the words of store_pairs, from k samples after each of so many addresses.
+
+    addresses: eight, twice (see keep_greater).
+    """
+    if lanes == LANES:
+        for j in range(LANES):
+            places = (np.uint64(addresses[j] + k), np.uint64(addresses[LANES + j] + k))
+            keep_greater(band, places, words, PAIR[j], COLOR_MASK)
+    else:
+        for j in range(lanes):
+            places = (np.uint64(addresses[j] + k), np.uint64(addresses[LANES + j] + k))
+            keep_greater(band, places, words, PAIR[j], COLOR_MASK)
+
+
+@inlined
+def clear_samples(first, count, background, halves):
+    """Empty samples from `first` on: infinitely far, the background's colour; up to seven more are cleared, too."""
+    empty = select((iota() & np.int32(1)) == np.int32(0), splat(background), EMPTY)
+    for k in range(2 * np.uint64(first), 2 * np.uint64(first + count), LANES):
+        store(halves, k, empty)
+
+
+@inlined
+def colors_of(halves, first):
+    """Colours of eight samples from `first` on."""
+    k = np.uint64(2) * np.uint64(first)
+    return even_lanes(load(halves, k), load(halves, k + np.uint64(LANES)))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_shade import exp2_fast
+from .scalars import exp2_fast
 from .volume_sample import AT, EYE, LIGHT, LIST, VALUE, any_marked, on_slice, sample_points
 
 RAYS = 128  # of a block

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_shade import exp2_fast, log2_fast
+from .scalars import exp2_fast, log2_fast
 from .volume_setup import BLOCK, TABLE
 
 CHUNK = 4  # log2 of samples in a run

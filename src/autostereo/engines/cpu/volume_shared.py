@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_shade import exp2_fast, log2_fast
+from .scalars import exp2_fast, log2_fast
 from .volume_rays import (
     BACK,
     BACK_LIGHT,

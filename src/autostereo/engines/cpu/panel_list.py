@@ -1,0 +1,163 @@
+"""Lists of a panel's samples that a segment or chord may cover: what meshes and points share.
+
+Of each line of sub-pixels (panel_lines) a stretch between two straight edges is an interval, found by two
+multiplications, eight lines at a time (SIMD over lines); the samples of all intervals make one list of addresses.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .jit import inlined
+from .panel_lines import BUCKET
+from .scalars import ONE, ZERO
+from .simd import LANES, ceil, floor, greater, iota, lesser, load, mask_word, select, splat, store, to_float, to_int
+
+STRIDE = 1040  # room of a list: CAPACITY, what one step more adds and fills up; no multiple of a page
+CAPACITY = 1008
+SLACK = np.float32(4e-3)  # rounding moves the end of a segment by less
+FAR = np.float32(1e9)
+
+# rows of the float32 lists …
+LANE_U, LANE_Z, LANE_X, LANE_OFFSET, COLOR = (np.uint64(k * STRIDE) for k in range(5))
+FLOAT_ROWS = 5
+# … and of the int32 lists
+ADDRESS, BASE = (np.uint64(k * STRIDE) for k in range(2))
+INT_ROWS = 2
+
+
+class Block(NamedTuple):
+    """Samples of a few rows of the panel, one thread's own memory.
+
+    offsets (R·3·B,) float32: camera offset of each sample, at row·3·B + channel·B + pixel; lines, addresses, starts
+    (R, …): see make_lines; found, found_ints, u: scratch.
+    """
+
+    offsets: np.ndarray
+    lines: np.ndarray
+    addresses: np.ndarray
+    starts: np.ndarray
+    found: np.ndarray
+    found_ints: np.ndarray
+    u: np.ndarray
+
+
+@inlined
+def interval(slope, misfit, period, drift, bounded_below):
+    """How an edge that moves by `slope` pixels per unit of offset bounds a line's samples.
+
+    The sample j with x = x0 + j·period and offset o0 + j·drift lies right of the edge where
+    j·(period − drift·slope) ≥ gap. Returns what gap is to be multiplied by, and what is to be added for the first and
+    for the last sample; both infinite where the edge is nearly parallel to the line.
+    """
+    across = period - drift * slope
+    slack = misfit * abs(slope) + SLACK
+    if abs(across) * np.float32(512.0) < slack:
+        return ZERO, -FAR, FAR
+    inverse = ONE / across
+    slack = abs(slack * inverse)
+    if (across > ZERO) == bounded_below:
+        return inverse, -slack, FAR
+    return inverse, -FAR, slack
+
+
+@inlined
+def bounds_of(ends, place):
+    """What `intervals` needs to know of a stretch between two edges; see `interval`."""
+    plan, spread = place.plan, place.at[5]
+    drift, misfit, period = np.float32(plan.slope * plan.step), np.float32(plan.misfit), np.float32(plan.period)
+    by1, low1, high1 = interval(ends[1], misfit, period, drift, True)
+    by2, low2, high2 = interval(ends[3], misfit, period, drift, False)
+    low1, high1 = low1 - spread * abs(by1), high1 + spread * abs(by1)
+    low2, high2 = low2 - spread * abs(by2), high2 + spread * abs(by2)
+    return by1, low1, high1, by2, low2, high2
+
+
+@inlined
+def intervals(xs, offsets, numbers, ends, bounds, at):
+    """Of eight lines the first sample that the stretch may cover, and the number of samples, as whole float32."""
+    x1, p1, x2, p2 = ends
+    by1, low1, high1, by2, low2, high2 = bounds
+    gap1 = ((offsets * p1 + x1) - xs - at) * by1
+    gap2 = ((offsets * p2 + x2) - xs - at) * by2
+    start = lesser(greater(greater(ceil(gap1 + low1), ceil(gap2 + low2)), ZERO), numbers)
+    end = lesser(lesser(floor(gap1 + high1), floor(gap2 + high2)) + ONE, numbers)
+    return start, end - start
+
+
+@inlined
+def swept(ends, place):
+    """The pixels from `place.first` on that a stretch may sweep from all cameras, first and last; first > last if none.
+
+    Two more than that: rounding, and samples that do not lie in the middle of their pixel.
+    """
+    x1, p1, x2, p2 = ends
+    low, high = np.float32(place.plan.low), np.float32(place.plan.high)
+    left = min(x1 + low * p1, x1 + high * p1) - np.float32(2.0)
+    right = max(x2 + low * p2, x2 + high * p2) + np.float32(1.0)
+    first = np.float32(place.first)
+    return max(left - first, ZERO), min(right - first, np.float32(place.columns) - ONE)
+
+
+@inlined
+def draw_stretch(draw_listed, place, row, ends, what, scratch):
+    """List the samples of a row that a stretch x1 + o·p1 ≤ x < x2 + o·p2 may cover; ends = (x1, p1, x2, p2).
+
+    Calls draw_listed(n, place, row, ends, what, scratch) for at most CAPACITY samples at a time, whose addresses are in
+    scratch.ints; the list is filled up with the row's first sample to whole SIMD steps.
+    """
+    left, right = swept(ends, place)
+    if left > right:
+        return
+    ints, plan = scratch.ints, place.plan
+    xs, numbers, offsets = place.block.lines[row, 0], place.block.lines[row, 1], place.block.lines[row, 2]
+    addresses, starts = place.block.addresses[row], place.block.starts[row]
+    period, step = np.float32(plan.period), np.int32(plan.period)
+    line = np.int64(starts[np.int64(max(left - np.float32(plan.reach), ZERO)) >> BUCKET])
+    stop = np.int64(starts[(np.int64(right) >> BUCKET) + 1])
+    bounds, at = bounds_of(ends, place), place.at[4]
+    n, word, k = np.uint64(0), np.int32(0), np.int32(0)
+    run, address = splat(np.int32(0)), splat(np.int32(0))
+    last = splat(np.int32(row * 3 * place.columns))
+    while line < stop or word != 0:
+        while n <= np.uint64(CAPACITY):
+            if word == 0:
+                if line >= stop:
+                    break
+                i = np.uint64(line)
+                start, length = intervals(load(xs, i), load(offsets, i), load(numbers, i), ends, bounds, at)
+                here = to_float(iota()) < np.float32(stop - line)
+                run = select(here, to_int(length), np.int32(0))
+                address = load(addresses, i) + to_int(start * period)
+                line += LANES
+                k = np.int32(0)
+            else:
+                store(ints, BASE, address + np.int32(k * step))
+                for j in range(LANES):
+                    ints[ADDRESS + n] = ints[BASE + np.uint64(j)]
+                    n += np.uint64((word >> np.int32(j)) & np.int32(1))
+                k = np.int32(k + 1)
+            word = mask_word(run > k)
+        if n > np.uint64(0):
+            store(ints, ADDRESS + n, last)
+            store(ints, ADDRESS + n + np.uint64(LANES), last)
+            draw_listed(n, place, row, ends, what, scratch)
+            n = np.uint64(0)
+
+
+@inlined
+def place_samples(n, row, place, lists, ints):
+    """Pixel position and exact camera offset of the listed samples."""
+    offsets, red, green, blue = place.block.offsets, place.at[0], place.at[1], place.at[2]
+    begin, first, columns = np.int32(row * 3 * place.columns), np.float32(place.first), np.float32(place.columns)
+    for i in range(n):
+        lists[LANE_OFFSET + i] = offsets[np.uint64(ints[ADDRESS + i])]
+    for i in range(n):
+        k = np.float32(np.int32(ints[ADDRESS + i] - begin))
+        at = red if k < columns else (green if k < columns + columns else blue)
+        k = k if k < columns else (k - columns if k < columns + columns else k - columns - columns)
+        lists[LANE_X + i] = (k + first) + at
+
+

@@ -1,0 +1,313 @@
+"""How the functions of `simd` and the operators on its vectors are compiled: one LLVM instruction each, or a few."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import lower_builtin, models, register_model, type_callable
+
+from . import simd
+from .simd import LANES
+
+SHUFFLES: dict[Callable[..., Any], tuple[int, ...]] = {
+    simd.low_halves: (0, 8, 1, 9, 4, 12, 5, 13),
+    simd.high_halves: (2, 10, 3, 11, 6, 14, 7, 15),
+    simd.low_pairs: (0, 1, 8, 9, 4, 5, 12, 13),
+    simd.high_pairs: (2, 3, 10, 11, 6, 7, 14, 15),
+    simd.first_fours: (0, 1, 2, 3, 8, 9, 10, 11),
+    simd.last_fours: (4, 5, 6, 7, 12, 13, 14, 15),
+    simd.even_lanes: (0, 2, 4, 6, 8, 10, 12, 14),
+}
+
+
+# --- types ----------------------------------------------------------------------------------------------------
+class VectorType(types.Type):
+    """Eight lanes of float32, float64, int32 or truth."""
+
+    def __init__(self, name: str, scalar: Any) -> None:
+        self.scalar = scalar
+        super().__init__(name=f"{name}x{LANES}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled by name: there is one of each kind, also in a cache of compiled kernels."""
+        return _kind, (self.name,)
+
+
+def _kind(name: str) -> VectorType:
+    return {kind.name: kind for kind in (F32, F64, I32, MASK)}[name]
+
+
+F32 = VectorType("float32", types.float32)
+F64 = VectorType("float64", types.float64)
+I32 = VectorType("int32", types.int32)
+MASK = VectorType("bool", types.boolean)
+_LLVM = {
+    F32: ir.VectorType(ir.FloatType(), LANES),
+    F64: ir.VectorType(ir.DoubleType(), LANES),
+    I32: ir.VectorType(ir.IntType(32), LANES),
+    MASK: ir.VectorType(ir.IntType(1), LANES),
+}
+_OF_SCALAR = {types.float32: F32, types.float64: F64, types.int32: I32}
+
+
+@register_model(VectorType)
+class VectorModel(models.PrimitiveModel):
+    """A vector lives in a register."""
+
+    def __init__(self, dmm: Any, fe_type: VectorType) -> None:
+        super().__init__(dmm, fe_type, _LLVM[fe_type])
+
+
+def _element(builder: Any, index: Any, value: Any) -> Any:
+    return builder.extract_element(value, ir.Constant(ir.IntType(32), index))
+
+
+def _repeat(builder: Any, value: Any) -> Any:
+    """A scalar in every lane."""
+    vector = ir.VectorType(value.type, LANES)
+    one = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.Constant(ir.IntType(32), 0))
+    zeros = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+    return builder.shuffle_vector(one, ir.Constant(vector, ir.Undefined), zeros)
+
+
+def _widen(builder: Any, value: Any, kind: Any) -> Any:
+    return value if isinstance(kind, VectorType) else _repeat(builder, value)
+
+
+# --- operators --------------------------------------------------------------------------------------------------
+def _binary(op: Any, rules: dict[VectorType, tuple[VectorType, Callable[..., Any]]]) -> None:
+    """Type and lower `op` for two vectors, or a vector and a scalar of its kind."""
+
+    class Template(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            a, b = args
+            kind = a if isinstance(a, VectorType) else b
+            if kind in rules and all(t is kind or t == kind.scalar for t in (a, b)):
+                return signature(rules[kind][0], a, b)
+            return None
+
+    infer_global(op)(Template)
+    for kind, (_, emit) in rules.items():
+        pairs = [(kind, kind), (kind, kind.scalar), (kind.scalar, kind)]
+        for pair in pairs:
+
+            def lower(context: Any, builder: Any, sig: Any, args: Any, emit: Any = emit) -> Any:
+                a, b = (_widen(builder, value, t) for value, t in zip(args, sig.args, strict=True))
+                return emit(builder, a, b)
+
+            lower_builtin(op, *pair)(lower)
+
+
+def _floats(emit: Callable[..., Any]) -> dict[VectorType, tuple[VectorType, Callable[..., Any]]]:
+    return {F32: (F32, emit), F64: (F64, emit)}
+
+
+def _ints(emit: Callable[..., Any]) -> dict[VectorType, tuple[VectorType, Callable[..., Any]]]:
+    return {I32: (I32, emit)}
+
+
+def _masks(emit: Callable[..., Any]) -> dict[VectorType, tuple[VectorType, Callable[..., Any]]]:
+    return {MASK: (MASK, emit)}
+
+
+def _compare(sign: str) -> dict[VectorType, tuple[VectorType, Callable[..., Any]]]:
+    def ordered(b: Any, x: Any, y: Any) -> Any:
+        return b.fcmp_ordered(sign, x, y)
+
+    return {F32: (MASK, ordered), F64: (MASK, ordered), I32: (MASK, lambda b, x, y: b.icmp_signed(sign, x, y))}
+
+
+_binary(operator.add, _floats(lambda b, x, y: b.fadd(x, y)) | _ints(lambda b, x, y: b.add(x, y)))
+_binary(operator.sub, _floats(lambda b, x, y: b.fsub(x, y)) | _ints(lambda b, x, y: b.sub(x, y)))
+_binary(operator.mul, _floats(lambda b, x, y: b.fmul(x, y)) | _ints(lambda b, x, y: b.mul(x, y)))
+_binary(operator.truediv, _floats(lambda b, x, y: b.fdiv(x, y)))
+_binary(operator.and_, _ints(lambda b, x, y: b.and_(x, y)) | _masks(lambda b, x, y: b.and_(x, y)))
+_binary(operator.or_, _ints(lambda b, x, y: b.or_(x, y)) | _masks(lambda b, x, y: b.or_(x, y)))
+_binary(operator.lshift, _ints(lambda b, x, y: b.shl(x, y)))
+_binary(operator.rshift, _ints(lambda b, x, y: b.ashr(x, y)))
+for _sign in ("<", "<=", ">", ">=", "=="):
+    _binary({"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "==": operator.eq}[_sign],
+            _compare(_sign))
+
+
+# --- functions --------------------------------------------------------------------------------------------------
+def _function(function: Any, accepts: Callable[..., Any], emit: Callable[..., Any]) -> None:
+    """Type `function` by `accepts(*argument types)`, a result type or None, and lower it by `emit`."""
+
+    def typer_for(context: Any) -> Any:
+        return _fixed(accepts)
+
+    type_callable(function)(typer_for)
+    count = accepts.__code__.co_argcount
+    lower_builtin(function, *[types.Any] * count)(emit)
+
+
+def _fixed(accepts: Callable[..., Any]) -> Callable[..., Any]:
+    """`accepts` under the fixed signature that Numba wants of a typer."""
+    count = accepts.__code__.co_argcount
+    signatures: list[Callable[..., Any]] = [
+        lambda: accepts(),
+        lambda a: accepts(a),
+        lambda a, b: accepts(a, b),
+        lambda a, b, c: accepts(a, b, c),
+        lambda a, b, c, d: accepts(a, b, c, d),
+        lambda a, b, c, d, e: accepts(a, b, c, d, e),
+    ]
+    return signatures[count]
+
+
+def _pointer(context: Any, builder: Any, kind: Any, array: Any, index: Any, index_type: Any) -> Any:
+    """Address of an element of a contiguous one-dimensional array."""
+    view = context.make_array(kind)(context, builder, array)
+    wide = context.cast(builder, index, index_type, types.uintp)
+    return builder.gep(view.data, [wide])
+
+
+def _vector_of(array: Any) -> Any:
+    return _OF_SCALAR.get(array.dtype) if isinstance(array, types.Array) and array.ndim == 1 else None
+
+
+def _emit_load(context, builder, sig, args):
+    pointer = _pointer(context, builder, sig.args[0], args[0], args[1], sig.args[1])
+    place = builder.bitcast(pointer, _LLVM[sig.return_type].as_pointer())
+    return builder.load(place, align=sig.return_type.scalar.bitwidth // 8)
+
+
+def _emit_store(context, builder, sig, args):
+    pointer = _pointer(context, builder, sig.args[0], args[0], args[1], sig.args[1])
+    align = sig.args[2].scalar.bitwidth // 8
+    builder.store(args[2], builder.bitcast(pointer, args[2].type.as_pointer()), align=align)
+    return context.get_dummy_value()
+
+
+def _emit_stream(context, builder, sig, args):
+    pointer = _pointer(context, builder, sig.args[0], args[0], args[1], sig.args[1])
+    half = LANES // 2
+    kind = ir.VectorType(args[2].type.element, half)
+    flag = builder.module.add_metadata([ir.Constant(ir.IntType(32), 1)])
+    for k in range(2):
+        order = ir.Constant(ir.VectorType(ir.IntType(32), half), [half * k + i for i in range(half)])
+        part = builder.shuffle_vector(args[2], args[2], order)
+        place = builder.gep(pointer, [ir.Constant(ir.IntType(64), half * k)])
+        builder.store(part, builder.bitcast(place, kind.as_pointer()), align=16).set_metadata("nontemporal", flag)
+    return context.get_dummy_value()
+
+
+def _emit_keep_greater(context, builder, sig, args):
+    pair = ir.VectorType(ir.IntType(64), 2)
+    places = [builder.extract_value(args[1], i) for i in range(2)]
+    pointers = [_pointer(context, builder, sig.args[0], args[0], place, sig.args[1].dtype) for place in places]
+    pointers.append(_pointer(context, builder, sig.args[2], args[2], args[3], sig.args[3]))
+    again, target, source = (builder.bitcast(pointer, pair.as_pointer()) for pointer in pointers)
+    old, new = builder.load(again, align=8), builder.load(source, align=8)
+    mask = builder.insert_element(ir.Constant(pair, ir.Undefined), args[4], ir.Constant(ir.IntType(32), 0))
+    mask = builder.shuffle_vector(mask, mask, ir.Constant(ir.VectorType(ir.IntType(32), 2), [0, 0]))
+    chosen = builder.select(builder.icmp_signed(">", new, builder.or_(old, mask)), new, old)
+    builder.store(chosen, target, align=8)
+    return context.get_dummy_value()
+
+
+def _emit_prefetch(context, builder, sig, args):
+    pointer = _pointer(context, builder, sig.args[0], args[0], args[1], sig.args[1])
+    byte, word = ir.IntType(8).as_pointer(), ir.IntType(32)
+    kind = ir.FunctionType(ir.VoidType(), [byte, word, word, word])
+    function = builder.module.declare_intrinsic("llvm.prefetch", (byte,), kind)
+    read, keep, data = (ir.Constant(word, value) for value in (0, 3, 1))
+    builder.call(function, [builder.bitcast(pointer, byte), read, keep, data])
+    return context.get_dummy_value()
+
+
+def _emit_gather(context, builder, sig, args):
+    data = context.make_array(sig.args[0])(context, builder, args[0]).data
+    result = ir.Constant(_LLVM[sig.return_type], ir.Undefined)
+    for k in range(LANES):
+        index = builder.zext(_element(builder, k, args[1]), ir.IntType(64))
+        value = builder.load(builder.gep(data, [index]))
+        result = builder.insert_element(result, value, ir.Constant(ir.IntType(32), k))
+    return result
+
+
+def _emit_call(name: str) -> Callable[..., Any]:
+    def emit(context, builder, sig, args):
+        vector = args[0].type
+        function = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(vector, [vector]), f"llvm.{name}.v{LANES}f32"
+        )
+        return builder.call(function, args)
+
+    return emit
+
+
+def _emit_choice(sign: str) -> Callable[..., Any]:
+    def emit(context, builder, sig, args):
+        a, b = (_widen(builder, value, t) for value, t in zip(args, sig.args, strict=True))
+        compare = builder.icmp_signed if sig.return_type is I32 else builder.fcmp_ordered
+        return builder.select(compare(sign, a, b), a, b)
+
+    return emit
+
+
+def _emit_to_float(context, builder, sig, args):
+    convert = builder.sitofp if sig.args[0] is I32 else builder.fptrunc
+    return convert(args[0], _LLVM[F32])
+
+
+def _emit_select(context, builder, sig, args):
+    a, b = (_widen(builder, value, t) for value, t in zip(args[1:], sig.args[1:], strict=True))
+    return builder.select(args[0], a, b)
+
+
+def _emit_mask_word(context, builder, sig, args):
+    return builder.zext(builder.bitcast(args[0], ir.IntType(LANES)), ir.IntType(32))
+
+
+def _emit_lane(context, builder, sig, args):
+    return builder.extract_element(args[0], context.cast(builder, args[1], sig.args[1], types.int32))
+
+
+def _emit_shuffle(order: tuple[int, ...]) -> Callable[..., Any]:
+    def emit(context, builder, sig, args):
+        mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), list(order))
+        return builder.shuffle_vector(args[0], args[1], mask)
+
+    return emit
+
+
+def _both(a: Any, b: Any) -> Any:
+    """The vector that two arguments make, one of them perhaps a scalar of its kind."""
+    kind = a if isinstance(a, VectorType) else b
+    fits = isinstance(kind, VectorType) and all(t is kind or t == kind.scalar for t in (a, b))
+    return kind if fits else None
+
+
+_function(simd.load, lambda array, index: _vector_of(array), _emit_load)
+_function(simd.store, lambda array, index, vector: types.none if _vector_of(array) is vector else None, _emit_store)
+_function(
+    simd.keep_greater,
+    lambda array, places, words, k, mask: types.none if array.dtype == words.dtype == mask == types.int64 else None,
+    _emit_keep_greater,
+)
+_function(simd.prefetch, lambda array, index: types.none if isinstance(array, types.Array) else None, _emit_prefetch)
+_function(simd.stream, lambda array, index, vector: types.none if _vector_of(array) is vector else None, _emit_stream)
+_function(simd.gather, lambda array, indices: _vector_of(array) if indices is I32 else None, _emit_gather)
+_function(simd.splat, lambda value: _OF_SCALAR.get(value), lambda c, b, s, a: _repeat(b, a[0]))
+_function(simd.iota, lambda: I32, lambda c, b, s, a: ir.Constant(_LLVM[I32], list(range(LANES))))
+_function(simd.select, lambda mask, a, b: _both(a, b) if mask is MASK else None, _emit_select)
+_function(simd.lesser, lambda a, b: _both(a, b), _emit_choice("<"))
+_function(simd.greater, lambda a, b: _both(a, b), _emit_choice(">"))
+for _name, _call in (("floor", simd.floor), ("ceil", simd.ceil), ("sqrt", simd.sqrt)):
+    _function(_call, lambda a: F32 if a is F32 else None, _emit_call(_name))
+_function(simd.to_int, lambda a: I32 if a is F32 else None, lambda c, b, s, a: b.fptosi(a[0], _LLVM[I32]))
+_function(simd.to_float, lambda a: F32 if a is I32 or a is F64 else None, _emit_to_float)
+_function(simd.bits, lambda a: I32 if a is F32 else None, lambda c, b, s, a: b.bitcast(a[0], _LLVM[I32]))
+_function(simd.from_bits, lambda a: F32 if a is I32 else None, lambda c, b, s, a: b.bitcast(a[0], _LLVM[F32]))
+_function(simd.mask_word, lambda mask: types.int32 if mask is MASK else None, _emit_mask_word)
+_function(simd.lane, lambda vector, k: vector.scalar if isinstance(vector, VectorType) else None, _emit_lane)
+for _shuffle, _order in SHUFFLES.items():
+    _function(_shuffle, lambda a, b: a if a is b and isinstance(a, VectorType) else None, _emit_shuffle(_order))
