@@ -205,7 +205,7 @@ def surface_at(
             arrays, e, numbers, (faces, face_ids, vertices, attributes, uv)
         )
     side = round(options.samples**0.5)
-    bins = (0.5 / side, 1.0 - 0.5 / side, float(block), blocks)
+    bins = (0.5 / side, 1.0 - 0.5 / side, block, blocks)
     triangles, bin_start, binned = _binned(
         (prepared.arrays, memory), (faces, face_ids, vertices), numbers, draw.culling, bins
     )
@@ -287,7 +287,7 @@ def _binned(
 
     def fill(first: int, last: int) -> None:
         for c in range(first, last):
-            fill_bins(edges[c], kept[c], triangles, bins[3], cursors[c], binned)
+            fill_bins(edges[c], kept[c], triangles, bins[2], bins[3], cursors[c], binned)
 
     run_rows(chunks, fill, 1)
     return triangles, bin_start, binned

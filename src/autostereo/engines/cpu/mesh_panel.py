@@ -75,12 +75,12 @@ def draw_listed(n, place, row, ends, what, scratch):
         offset = gather(offsets, address)
         covered, z, u = hit(x, offset, ends, depths)
         depth = depth_bits(covered, z)
-        seen = mask_word(depth > gather(halves, address * np.int32(2) + np.int32(1)))
-        if seen == 0:
-            continue
         if kind == PLAIN:
             color = channel_color(u, green, blue, segment)
         else:
+            seen = mask_word(depth > gather(halves, address * np.int32(2) + np.int32(1)))
+            if seen == 0:
+                continue
             color = shade_or_reuse(kind, reuse, seen, (x, z, offset), u, at, shader, shading, scratch)
         store_words(depth, color, word_halves)
         for j in range(LANES):
@@ -97,20 +97,16 @@ def draw_segment(place, ends, depths, kind, shader, shading, scratch):
     draw_stretch(draw_listed, place, 0, ends, (depths, kind, shader, shading), scratch)
 
 
-@kernel
-def drawn_columns(bin_index, columns, surface, camera, plan):
+@inlined
+def drawn_columns(bin_index, columns, surface):
     """The pixels (first, end) of a block that its triangles may cover from some camera."""
-    left, right = np.float64(columns[1]), np.float64(columns[0])
-    scale = camera.fx / camera.focal
+    first, last = columns[1], columns[0]
     for entry in range(surface.bin_start[bin_index], surface.bin_start[bin_index + 1]):
         index = np.uint64(surface.bins[entry]) * np.uint64(8)
-        for k in range(np.uint64(3)):
-            corner = np.uint64(surface.triangles[index + k]) * np.uint64(3)
-            x, p = surface.vertices[corner], scale * (1.0 - surface.vertices[corner + np.uint64(2)])
-            left = min(left, x + plan.low * p, x + plan.high * p)
-            right = max(right, x + plan.low * p, x + plan.high * p)
-    first = max(np.int64(max(left - 2.0, 0.0)), columns[0])
-    return first, max(min(np.int64(min(right, 1e9)) + 2, columns[1]), first)
+        first = min(first, np.int64(surface.triangles[index + np.uint64(4)]))
+        last = max(last, np.int64(surface.triangles[index + np.uint64(5)]))
+    first = max(first, columns[0])
+    return first, max(min(last + 1, columns[1]), first)
 
 
 @inlined
@@ -190,7 +186,7 @@ def draw_panel(bins, surface, camera, shader, panel, block, background, side, sc
         r, first = k // bins[2], k % bins[2] * bins[3]
         columns = (first, min(first + bins[3], width))
         row = height - 1 - r if panel.flip_y else r
-        drawn = drawn_columns(k, columns, surface, camera, plan)
+        drawn = drawn_columns(k, columns, surface)
         base, count = drawn[0] - first, drawn[1] - drawn[0]
         if count > 0:
             row_offsets(row, width, panel.flip_x, drawn, 0, first, plane, plan, block.u, block.offsets)

@@ -199,7 +199,7 @@ def cull_and_count(chunk, faces, face_ids, vertices, scene, camera, span, bins, 
     """Keep the triangles of one chunk that some view may see, and count them per bin.
 
     A bin is a row × a block of columns; bins = (first and last sample of a row, columns per block, blocks). out[k] =
-    (top, middle, bottom vertex, 2·material + side of the long edge, first and last block, first row, end row); the
+    (top, middle, bottom vertex, 2·material + side of the long edge, first and last pixel, first row, end row); the
     triangles of chunk (first, last) are written from out[first] on, in the order of faces. counts[bin] is increased.
 
     Culling is conservative over all camera offsets in `span`: x is affine and the signed area too, so both
@@ -244,22 +244,22 @@ def cull_and_count(chunk, faces, face_ids, vertices, scene, camera, span, bins, 
             b, c, yb, yc, odd = c, b, yc, yb, 1 - odd
         if yb < ya:
             a, b, ya, yb, odd = b, a, yb, ya, 1 - odd
-        block0 = int(min(max((left - margin) / columns, 0.0), blocks - 1.0))
-        block1 = int(min(max((right + margin) / columns, 0.0), blocks - 1.0))
         out[kept, 0], out[kept, 1], out[kept, 2], out[kept, 3] = a, b, c, 2 * material + odd
-        out[kept, 4], out[kept, 5], out[kept, 6], out[kept, 7] = block0, block1, row0, row1
+        out[kept, 4] = max(left - margin, 0.0)
+        out[kept, 5] = min(right + margin, camera.width - 1.0)
+        out[kept, 6], out[kept, 7] = row0, row1
         kept += 1
-        for row in range(int(row0), int(row1)):
-            for block in range(block0, block1 + 1):
+        for row in range(out[kept - 1, 6], out[kept - 1, 7]):
+            for block in range(out[kept - 1, 4] // columns, out[kept - 1, 5] // columns + 1):
                 counts[row * blocks + block] += 1
     return kept - first
 
 
 @kernel
-def fill_bins(first, count, triangles, blocks, cursor, bins):
+def fill_bins(first, count, triangles, columns, blocks, cursor, bins):
     """Write the indices of triangles first…first+count into their bins, from cursor[bin] on."""
     for k in range(first, first + count):
         for row in range(triangles[k, 6], triangles[k, 7]):
-            for block in range(triangles[k, 4], triangles[k, 5] + 1):
+            for block in range(triangles[k, 4] // columns, triangles[k, 5] // columns + 1):
                 bins[cursor[row * blocks + block]] = k
                 cursor[row * blocks + block] += 1

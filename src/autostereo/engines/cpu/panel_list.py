@@ -13,10 +13,10 @@ import numpy as np
 from .jit import inlined
 from .panel_lines import BUCKET
 from .scalars import ONE, ZERO
-from .simd import LANES, ceil, floor, greater, iota, lesser, load, mask_word, select, splat, store, to_float, to_int
+from .simd import LANES, append, ceil, floor, greater, iota, lesser, load, mask_word, select, splat, store, to_int
 
-STRIDE = 1040  # room of a list: CAPACITY, what one step more adds and fills up; no multiple of a page
-CAPACITY = 1008
+STRIDE = 1040  # room of a list: CAPACITY, what a step more adds, and what fills it up; no multiple of a page
+CAPACITY = 1000
 SLACK = np.float32(4e-3)  # rounding moves the end of a segment by less
 FAR = np.float32(1e9)
 
@@ -24,8 +24,8 @@ FAR = np.float32(1e9)
 LANE_U, LANE_Z, LANE_X, LANE_OFFSET, COLOR = (np.uint64(k * STRIDE) for k in range(5))
 FLOAT_ROWS = 5
 # … and of the int32 lists
-ADDRESS, BASE = (np.uint64(k * STRIDE) for k in range(2))
-INT_ROWS = 2
+ADDRESS = np.uint64(0)
+INT_ROWS = 1
 
 
 class Block(NamedTuple):
@@ -45,45 +45,44 @@ class Block(NamedTuple):
 
 
 @inlined
-def interval(slope, misfit, period, drift, bounded_below):
-    """How an edge that moves by `slope` pixels per unit of offset bounds a line's samples.
+def edge_bound(x, slope, at, plan, spread, bounded_below):
+    """How an edge at x + o·slope bounds a line's samples: (of x, of offset, constant) and whether from below.
 
     The sample j with x = x0 + j·period and offset o0 + j·drift lies right of the edge where
-    j·(period − drift·slope) ≥ gap. Returns what gap is to be multiplied by, and what is to be added for the first and
-    for the last sample; both infinite where the edge is nearly parallel to the line.
+    j·(period − drift·slope) ≥ gap; the bound on j is c − x0·a + o0·b, widened by what may be in doubt. Where the edge
+    is nearly parallel to the line nothing is bounded: both numbers are 0, and the constant is far away.
     """
+    period, drift = np.float32(plan.period), np.float32(plan.slope * plan.step)
     across = period - drift * slope
-    slack = misfit * abs(slope) + SLACK
+    slack = np.float32(plan.misfit) * abs(slope) + SLACK
+    below = (across > ZERO) == bounded_below
     if abs(across) * np.float32(512.0) < slack:
-        return ZERO, -FAR, FAR
+        return (ZERO, ZERO, -FAR if bounded_below else FAR), bounded_below
     inverse = ONE / across
-    slack = abs(slack * inverse)
-    if (across > ZERO) == bounded_below:
-        return inverse, -slack, FAR
-    return inverse, -FAR, slack
+    slack = (slack + spread) * abs(inverse)
+    return (inverse, slope * inverse, (x - at) * inverse + (-slack if below else slack)), below
 
 
 @inlined
-def bounds_of(ends, place):
-    """What `intervals` needs to know of a stretch between two edges; see `interval`."""
-    plan, spread = place.plan, place.at[5]
-    drift, misfit, period = np.float32(plan.slope * plan.step), np.float32(plan.misfit), np.float32(plan.period)
-    by1, low1, high1 = interval(ends[1], misfit, period, drift, True)
-    by2, low2, high2 = interval(ends[3], misfit, period, drift, False)
-    low1, high1 = low1 - spread * abs(by1), high1 + spread * abs(by1)
-    low2, high2 = low2 - spread * abs(by2), high2 + spread * abs(by2)
-    return by1, low1, high1, by2, low2, high2
+def bound_of(edge, xs, offsets):
+    """The bound that an edge_bound sets to eight lines."""
+    of_x, of_offset, constant = edge
+    return (offsets * of_offset - xs * of_x) + constant
 
 
 @inlined
-def intervals(xs, offsets, numbers, ends, bounds, at):
-    """Of eight lines the first sample that the stretch may cover, and the number of samples, as whole float32."""
-    x1, p1, x2, p2 = ends
-    by1, low1, high1, by2, low2, high2 = bounds
-    gap1 = ((offsets * p1 + x1) - xs - at) * by1
-    gap2 = ((offsets * p2 + x2) - xs - at) * by2
-    start = lesser(greater(greater(ceil(gap1 + low1), ceil(gap2 + low2)), ZERO), numbers)
-    end = lesser(lesser(floor(gap1 + high1), floor(gap2 + high2)) + ONE, numbers)
+def intervals(xs, offsets, numbers, first, second, both):
+    """Of eight lines the first sample that the stretch may cover, and the number of samples, as whole float32.
+
+    first bounds from below, second from above; both = 0, or 1 (−1) where both bound from below (above).
+    """
+    low, high = bound_of(first, xs, offsets), bound_of(second, xs, offsets)
+    start, end = greater(ceil(low), ZERO), lesser(floor(high) + ONE, numbers)
+    if both > 0:
+        start, end = greater(start, ceil(high)), numbers
+    elif both < 0:
+        start, end = splat(ZERO), lesser(end, floor(low) + ONE)
+    start = lesser(start, numbers)
     return start, end - start
 
 
@@ -115,9 +114,13 @@ def draw_stretch(draw_listed, place, row, ends, what, scratch):
     xs, numbers, offsets = place.block.lines[row, 0], place.block.lines[row, 1], place.block.lines[row, 2]
     addresses, starts = place.block.addresses[row], place.block.starts[row]
     period, step = np.float32(plan.period), np.int32(plan.period)
+    first, below1 = edge_bound(ends[0], ends[1], place.at[4], plan, place.at[5], True)
+    second, below2 = edge_bound(ends[2], ends[3], place.at[4], plan, place.at[5], False)
+    both = np.int32(below1) + np.int32(below2) - np.int32(1)
+    if below2 and not below1:
+        first, second = second, first
     line = np.int64(starts[np.int64(max(left - np.float32(plan.reach), ZERO)) >> BUCKET])
     stop = np.int64(starts[(np.int64(right) >> BUCKET) + 1])
-    bounds, at = bounds_of(ends, place), place.at[4]
     n, word, k = np.uint64(0), np.int32(0), np.int32(0)
     run, address = splat(np.int32(0)), splat(np.int32(0))
     last = splat(np.int32(row * 3 * place.columns))
@@ -127,17 +130,15 @@ def draw_stretch(draw_listed, place, row, ends, what, scratch):
                 if line >= stop:
                     break
                 i = np.uint64(line)
-                start, length = intervals(load(xs, i), load(offsets, i), load(numbers, i), ends, bounds, at)
-                here = to_float(iota()) < np.float32(stop - line)
-                run = select(here, to_int(length), np.int32(0))
+                start, length = intervals(load(xs, i), load(offsets, i), load(numbers, i), first, second, both)
+                run = select(iota() < np.int32(stop - line), to_int(length), np.int32(0))
                 address = load(addresses, i) + to_int(start * period)
+                n = append(ints, ADDRESS + n, address, run > np.int32(0)) - ADDRESS
+                n = append(ints, ADDRESS + n, address + step, run > np.int32(1)) - ADDRESS
                 line += LANES
-                k = np.int32(0)
-            else:
-                store(ints, BASE, address + np.int32(k * step))
-                for j in range(LANES):
-                    ints[ADDRESS + n] = ints[BASE + np.uint64(j)]
-                    n += np.uint64((word >> np.int32(j)) & np.int32(1))
+                k = np.int32(2)
+            else:  # few stretches are as long
+                n = append(ints, ADDRESS + n, address + np.int32(k * step), run > k) - ADDRESS
                 k = np.int32(k + 1)
             word = mask_word(run > k)
         if n > np.uint64(0):

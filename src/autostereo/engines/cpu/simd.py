@@ -36,6 +36,16 @@ def gather(array, indices):
     return array[indices]
 
 
+def append(array, index, vector, mask):
+    """Write the lanes of an int32 vector where the mask holds from `index` on.
+
+    Returns the index behind the last one written; what follows, up to eight elements in all, may change, too.
+    """
+    kept = vector[mask]
+    array[index : index + len(kept)] = kept
+    return index + np.uint64(len(kept))
+
+
 def keep_greater(array, places, words, k, mask):
     """array[i] = words[k + i - p] where that is > array[i] | mask, for i = p and p + 1; p = places[0] = places[1].
 

@@ -6,8 +6,8 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-from llvmlite import ir
-from numba import types
+from llvmlite import binding, ir
+from numba import config, types
 from numba.core import cgutils
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin, models, register_model, type_callable
@@ -199,6 +199,38 @@ def _emit_stream(context, builder, sig, args):
     return context.get_dummy_value()
 
 
+def _has_avx2() -> bool:
+    """Whether kernels are compiled for this machine, and it has AVX2."""
+    if config.CPU_NAME not in (None, "host") or config.CPU_FEATURES is not None:
+        return False
+    return "x86_64" in binding.get_process_triple() and bool(binding.get_host_cpu_features().get("avx2"))
+
+
+def _emit_append(context, builder, sig, args):
+    array, index, vector, mask = args
+    wide = context.cast(builder, index, sig.args[1], types.uint64)
+    data = context.make_array(sig.args[0])(context, builder, array).data
+    word, byte = ir.IntType(32), ir.IntType(8)
+    number = builder.bitcast(mask, byte)
+    if not _has_avx2():
+        for k in range(LANES):
+            builder.store(_element(builder, k, vector), builder.gep(data, [wide]))
+            wide = builder.add(wide, builder.zext(_element(builder, k, mask), wide.type))
+        return wide
+    orders = [[k for k in range(LANES) if m >> k & 1] for m in range(256)]
+    table = ir.Constant(ir.ArrayType(byte, 256 * LANES), [k for o in orders for k in (o + [0] * LANES)[:LANES]])
+    place = builder.gep(
+        cgutils.global_constant(builder, "orders", table),
+        [ir.Constant(word, 0), builder.mul(builder.zext(number, word), ir.Constant(word, LANES))],
+    )
+    order = builder.load(builder.bitcast(place, ir.VectorType(byte, LANES).as_pointer()), align=1)
+    kind = ir.FunctionType(vector.type, [vector.type, vector.type])
+    permute = cgutils.get_or_insert_function(builder.module, kind, "llvm.x86.avx2.permd")
+    packed = builder.call(permute, [vector, builder.zext(order, vector.type)])
+    builder.store(packed, builder.bitcast(builder.gep(data, [wide]), vector.type.as_pointer()), align=4)
+    return builder.add(wide, builder.zext(builder.ctpop(number), wide.type))
+
+
 def _emit_keep_greater(context, builder, sig, args):
     pair = ir.VectorType(ir.IntType(64), 2)
     places = [builder.extract_value(args[1], i) for i in range(2)]
@@ -292,6 +324,11 @@ _function(
     simd.keep_greater,
     lambda array, places, words, k, mask: types.none if array.dtype == words.dtype == mask == types.int64 else None,
     _emit_keep_greater,
+)
+_function(
+    simd.append,
+    lambda array, index, vector, mask: types.uint64 if _vector_of(array) is vector is I32 and mask is MASK else None,
+    _emit_append,
 )
 _function(simd.prefetch, lambda array, index: types.none if isinstance(array, types.Array) else None, _emit_prefetch)
 _function(simd.stream, lambda array, index, vector: types.none if _vector_of(array) is vector else None, _emit_stream)
