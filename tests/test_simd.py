@@ -1,0 +1,209 @@
+"""Explicit SIMD: what is compiled gives the bits that the plain definition in NumPy gives."""
+
+from __future__ import annotations
+
+import functools
+import os
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from autostereo.engines.cpu import simd
+from autostereo.engines.cpu.jit import kernel
+from autostereo.engines.cpu.simd import (
+    LANES,
+    append,
+    bits,
+    ceil,
+    even_lanes,
+    first_fours,
+    floor,
+    from_bits,
+    gather,
+    greater,
+    high_halves,
+    high_pairs,
+    iota,
+    keep_greater,
+    lane,
+    last_fours,
+    lesser,
+    load,
+    low_halves,
+    low_pairs,
+    mask_word,
+    prefetch,
+    select,
+    splat,
+    sqrt,
+    store,
+    stream,
+    to_float,
+    to_int,
+)
+
+pytestmark = pytest.mark.skipif(
+    os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"), reason="the JIT is off: nothing to compare"
+)
+
+floats = arrays(np.float32, 2 * LANES, elements=st.floats(-1e6, 1e6, width=32))
+doubles = arrays(np.float64, 2 * LANES, elements=st.floats(-1e9, 1e9))
+ints = arrays(np.int32, 2 * LANES, elements=st.integers(-(2**20), 2**20))
+words = arrays(np.int64, 8, elements=st.integers(-(2**62), 2**62))
+
+
+def arithmetic(a, out):
+    """Every operator and function of float32."""
+    x, y = load(a, 0), load(a, LANES)
+    results = (
+        x + y, x - y, x * y, x / y, x * np.float32(3.0), np.float32(2.0) - y, lesser(x, y), greater(x, y),
+        floor(x), ceil(y), sqrt(greater(x, np.float32(0.0))), select(x < y, x, y), select(x >= y, x, np.float32(7.0)),
+        from_bits(bits(x)), to_float(to_int(x)), splat(a[3]), gather(a, iota() + np.int32(5)),
+        low_halves(x, y), high_halves(x, y), low_pairs(x, y), high_pairs(x, y), first_fours(x, y), last_fours(x, y),
+        even_lanes(x, y), lesser(greater(x, np.float32(-1.0)), np.float32(1.0)),
+    )  # fmt: skip
+    for k in range(len(results)):
+        store(out, k * LANES, results[k])
+    prefetch(a, 3)
+    return mask_word(x < y), mask_word((x <= y) & (y > x)), mask_word((x == y) | (x > y)), lane(x, 5)
+
+
+def doubles_of(a, out, narrow):
+    """Operators of float64, and rounding to float32."""
+    x, y = load(a, 0), load(a, LANES)
+    results = (x + y, x - y, x * y, x / y, 1.5 * x, splat(a[2]), select(x < y, x, y), gather(a, iota()))
+    for k in range(len(results)):
+        store(out, k * LANES, results[k])
+    store(narrow, 0, to_float(x))
+    return mask_word(x >= y)
+
+
+def whole_numbers(a, out):
+    """Operators of int32."""
+    x, y = load(a, 0), load(a, LANES)
+    results = (
+        x + y, x - y, x * y, x & y, x | np.int32(5), x << np.int32(3), x >> np.int32(2), iota(), lesser(x, y),
+        greater(x, np.int32(3)), select(x == y, x, np.int32(-1)), gather(a, iota()),
+    )  # fmt: skip
+    for k in range(len(results)):
+        store(out, k * LANES, results[k])
+    return mask_word(x > y)
+
+
+def kept(target, new, mask):
+    """keep_greater on every pair of words."""
+    for k in range(0, 8, 2):
+        keep_greater(target, (np.uint64(k), np.uint64(k)), new, k, mask)
+
+
+def listed(a, limit, out):
+    """append: lanes above a limit, one behind the other."""
+    n = np.uint64(0)
+    for k in range(0, a.shape[0], LANES):
+        x = load(a, k)
+        n = append(out, n, x, x > limit)
+    return n
+
+
+def streamed(a, out):
+    """stream: as store."""
+    stream(out, 0, load(a, LANES))
+
+
+COMPILED = {f.__name__: kernel(f) for f in (arithmetic, doubles_of, whole_numbers, kept, listed, streamed)}
+
+
+def same(a: np.ndarray, b: np.ndarray) -> None:
+    """Equal to the bit, NaN included."""
+    np.testing.assert_array_equal(a.view(np.uint8), b.view(np.uint8))
+
+
+@given(floats)
+@settings(deadline=None, max_examples=60)
+def test_floats(a: np.ndarray) -> None:
+    out, wanted = np.zeros(25 * LANES, np.float32), np.zeros(25 * LANES, np.float32)
+    got = COMPILED["arithmetic"](a, out)
+    with np.errstate(all="ignore"):
+        assert got == arithmetic(a, wanted)
+    nan = np.isnan(wanted)
+    np.testing.assert_array_equal(np.isnan(out), nan)
+    same(out[~nan], wanted[~nan])
+
+
+@given(doubles)
+@settings(deadline=None, max_examples=60)
+def test_doubles(a: np.ndarray) -> None:
+    out, wanted = np.zeros(8 * LANES), np.zeros(8 * LANES)
+    narrow, wanted_narrow = np.zeros(LANES, np.float32), np.zeros(LANES, np.float32)
+    got = COMPILED["doubles_of"](a, out, narrow)
+    with np.errstate(all="ignore"):
+        assert got == doubles_of(a, wanted, wanted_narrow)
+    nan = np.isnan(wanted)
+    same(out[~nan], wanted[~nan])
+    same(narrow, wanted_narrow)
+
+
+@given(ints)
+@settings(deadline=None, max_examples=60)
+def test_whole_numbers(a: np.ndarray) -> None:
+    out, wanted = np.zeros(12 * LANES, np.int32), np.zeros(12 * LANES, np.int32)
+    got = COMPILED["whole_numbers"](a, out)
+    with np.errstate(all="ignore"):
+        assert got == whole_numbers(a, wanted)
+    same(out, wanted)
+
+
+@given(words, words, st.sampled_from([0, 0xFFFFFFFF]))
+@settings(deadline=None, max_examples=60)
+def test_keep_greater(old: np.ndarray, new: np.ndarray, mask: int) -> None:
+    target, wanted = old.copy(), old.copy()
+    COMPILED["kept"](target, new, np.int64(mask))
+    kept(wanted, new, np.int64(mask))
+    same(target, wanted)
+    same(target, np.where(new > (old | mask), new, old))
+
+
+@pytest.mark.parametrize("generic", [False, True])
+@given(ints, st.integers(-1000, 1000))
+@settings(deadline=None, max_examples=40)
+def test_append(generic: bool, a: np.ndarray, limit: int) -> None:
+    """By AVX2's table, and by the form for other processors."""
+    run = generic_listed() if generic else COMPILED["listed"]
+    out = np.zeros(4 * LANES, np.int32)
+    n = run(a, np.int32(limit), out)
+    np.testing.assert_array_equal(out[:n], a[a > limit])
+
+
+@functools.cache
+def generic_listed():
+    """`listed` compiled as for a processor without AVX2."""
+    from numba import njit
+
+    from autostereo.engines.cpu import simd_compiled
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(simd_compiled, "_has_avx2", lambda: False)
+        compiled = njit(listed)
+        compiled(np.zeros(LANES, np.int32), np.int32(0), np.zeros(4 * LANES, np.int32))
+    return compiled
+
+
+def test_stream_stores() -> None:
+    a = np.arange(2 * LANES, dtype=np.int32)
+    room = np.zeros(4 * LANES, np.int32)
+    start = -room.ctypes.data % 16 // 4
+    COMPILED["streamed"](a, room[start:])
+    np.testing.assert_array_equal(room[start : start + LANES], a[LANES:])
+
+
+def test_vectors_survive_a_cache() -> None:
+    """Kinds are pickled by name, so that kernels loaded from a cache know them."""
+    import pickle
+
+    from autostereo.engines.cpu.simd_compiled import F32, F64, I32, MASK
+
+    assert all(pickle.loads(pickle.dumps(kind)) is kind for kind in (F32, F64, I32, MASK))
+    assert simd.LANES == 8
