@@ -1,5 +1,6 @@
 """Volumes on the command line."""
 
+import importlib
 from pathlib import Path
 
 import numpy as np
@@ -122,6 +123,92 @@ def test_outputs_are_called_after_folders(tmp_path: Path, monkeypatch: pytest.Mo
     assert common.stem(scan) == "scan.1"
     monkeypatch.chdir(scan)
     assert common.stem(Path(".")) == "scan.1"
+
+
+@pytest.mark.parametrize("verb", ["render", "quilt", "views"])
+def test_every_verb_that_renders_takes_options_of_rays(cli: Run, verb: str) -> None:
+    text = cli(verb, "--help").out
+    for option in ("--step", "--volume", "--from", *(["--alpha"] if verb == "render" else [])):
+        assert option in text
+
+
+def test_options_of_rays_reach_the_engine(cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    door = importlib.import_module("autostereo.render")
+
+    given = []
+    for name in ("render", "render_views"):
+        monkeypatch.setattr(door, name, lambda *_, options, **__: given.append(options) or 1 / 0)
+    rays = ("--step", "2.5", "--volume", "exact", "--engine", "reference")
+    cli("render", "a.raw", *RAW, "-d", "alioscopy-8", *rays, "--alpha", "averaged")
+    cli("views", "a.raw", *RAW, "-o", "v", *rays)
+    cli("quilt", "a.raw", *RAW, "--grid", "2x1", "--view-size", "8x8", *rays)
+    assert [(o.step, o.volume, o.alpha) for o in given] == [(2.5, "exact", a) for a in ("averaged", "exact", "exact")]
+
+
+def test_views_from_a_side(cli: Run, folder: Path) -> None:
+    for side in ("front", "left"):
+        arguments = ("-o", side, "--views", "2", "--size", "8x8", "--from", side, "--engine", "reference")
+        assert cli("views", "a.raw", *RAW, *arguments).status == 0
+    front, left = (aus.Rig.load(Path(side) / "rig.json") for side in ("front", "left"))
+    assert front.position[2] > 4 and left.position[0] < 0 and left.up == (0, 1, 0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--step", "0"), "step: expected a number > 0"),
+        (("--step", "1e-9"), "slabs"),
+        (("--volume", "fast"), "volume: expected one of 'shared', 'exact', got 'fast'"),
+        (("--from", "behind"), "--from: expected one of front, back, left, right, top, bottom, got 'behind'"),
+        (("--from", "left", "--camera", "rig.json"), "--from: has no meaning with --camera"),
+    ],
+)
+def test_mistakes_in_options_of_rays_are_one_line(
+    cli: Run, folder: Path, arguments: tuple[str, ...], words: str
+) -> None:
+    aus.Rig().save("rig.json")
+    result = cli("views", "a.raw", *RAW, "-o", "v", "--size", "8x8", "--engine", "reference", *arguments)
+    assert result.status == 2 and words in result.err and result.err.count("\n") == 1
+
+
+def test_the_first_run_of_every_primitive_says_that_it_compiles(
+    cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from autostereo.engines.cpu import jit
+
+    asked: list[str] = []
+    monkeypatch.setattr(jit, "is_compiled", lambda *names: asked.extend(names) or False)
+    door = importlib.import_module("autostereo.render")
+
+    for name in ("render", "render_views"):
+        monkeypatch.setattr(door, name, lambda *_, **__: 1 / 0)
+    Path("points.xyz").write_text("0 0 0\n1 0 0\n0 1 0\n0 0 1\n")
+    panel, stack = ("render", "-d", "alioscopy-8"), ("views", "-o", "v")
+    for arguments, kernels in (
+        ((*panel, "a.raw", *RAW), ["draw_panel_rows-"]),
+        ((*stack, "a.raw", *RAW), ["draw_shared_rows-"]),
+        ((*stack, "a.raw", *RAW, "--volume", "exact"), ["draw_rows-"]),
+        ((*panel, "points.xyz"), ["splat_panel-"]),
+        ((*stack, "triangle.off", "points.xyz"), ["draw_views-", "splat_views-"]),
+        ((*panel, "a.raw", *RAW, "triangle.off"), ["draw_panel-", "draw_panel_rays-"]),
+        ((*panel, "points.xyz", "--method", "n-pass"), ["splat_views-"]),
+    ):
+        asked.clear()
+        assert cli(*arguments).err.startswith("compiling kernels")
+        assert asked == kernels
+
+
+def test_names_of_kernels_are_those_of_the_engine() -> None:
+    from autostereo.engines.cpu import mesh_panel, mesh_views, points_panel, points_views, volume_panel, volume_views
+    from autostereo.engines.options import Options
+    from autostereo.scene import samples
+
+    modules = (mesh_panel, mesh_views, points_panel, points_views, volume_panel, volume_views)
+    every = [samples.shells(16), samples.surfel_cloud(100), aus.Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [[0, 1, 2]])]
+    for scene in (aus.Scene(every), aus.Scene(every[:1])):
+        for panel in (False, True):
+            for name in common.kernels_for(scene, panel, Options()):
+                assert any(hasattr(module, name.removesuffix("-")) for module in modules)
 
 
 def test_render_and_views_of_a_volume(cli: Run, folder: Path) -> None:

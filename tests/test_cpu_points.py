@@ -12,6 +12,7 @@ from autostereo.engines.cpu import gather
 from autostereo.engines.cpu import points as cpu
 from autostereo.engines.cpu.memory import Memory
 from autostereo.engines.engine import Draw
+from autostereo.engines.reference.points import is_thin
 from autostereo.scene.samples import surfel_cloud
 from autostereo.transforms import rotation, scaling, translation
 from eye_scenes import CAMERA, FLAT, quad
@@ -158,6 +159,10 @@ def test_a_disc_is_its_projection(normal, radius, behind):
     found, depth = splat(surfels(position, normal, radius, colors=[color]), draw_of())
     for i, offset in enumerate(OFFSETS):
         weight, expected = hits(position, normal, radius, offset)
+        centre = (position - (offset, 0, 0)) * (1, 1, -1)  # in eye space, of this eye
+        unit = normal * (1, 1, -1) / np.linalg.norm(normal)
+        if is_thin(centre[None], unit[None], np.array([radius]), CAMERA)[0]:
+            continue  # see test_a_disc_turns_from_its_front_over_its_edge_to_its_back
         sure = np.abs(weight) > 1e-4
         np.testing.assert_array_equal((found[i, ..., 3] == 255)[sure], (weight > 0)[sure])
         inside = sure & (weight > 0)

@@ -107,6 +107,41 @@ def test_the_box_fills_the_picture_where_something_limits_it(display: Display, h
     assert most == pytest.approx(1 - MARGIN, rel=1e-6) or distance == pytest.approx(1.25 * half[2])
 
 
+@pytest.mark.parametrize("anatomical", [False, True])
+@pytest.mark.parametrize("side", ["front", "back", "left", "right", "top", "bottom"])
+def test_every_side_shows_the_whole_box(side: str, anatomical: bool) -> None:
+    scene = box((1, 2, 3), (0.5, 2, 3.5))
+    scene.anatomical = anatomical
+    for display in (DISPLAYS[0], DISPLAYS[-2]):
+        rig = Rig.frame(scene, display, side)
+        for offset in rig.camera_offsets:
+            places = window(rig, corners_of(scene.bounds), float(offset))
+            assert max(np.abs(v).max() for v in places) <= 1 - MARGIN + 1e-9
+
+
+@pytest.mark.parametrize(("side", "screen"), [
+    # what is at the right, the top and near in the picture: of a patient L, P, S are +x, +y, +z
+    ("front", ("+x", "+z", "-y")), ("back", ("-x", "+z", "+y")), ("left", ("+y", "+z", "+x")),
+    ("right", ("-y", "+z", "-x")), ("top", ("-x", "-y", "+z")), ("bottom", ("+x", "-y", "-z")),
+])  # fmt: skip
+def test_sides_of_a_patient(side: str, screen: tuple[str, str, str]) -> None:
+    """From the front the patient's left is at the right of the picture and the head on top; so it is from the feet."""
+    axes = {f"{sign}{name}": s * np.eye(3)[k] for k, name in enumerate("xyz") for sign, s in (("+", 1), ("-", -1))}
+    patient = aus.Volume(np.zeros((3, 3, 3), np.uint8), origin=(-1, -1, -1), anatomical=True)
+    rig = Rig.frame(aus.Scene(patient), DISPLAYS[0], side)
+    expected = np.stack([axes[screen[0]], axes[screen[1]], -axes[screen[2]]])
+    np.testing.assert_allclose(rig.eye_from_world[:3, :3], expected, atol=1e-12)
+
+
+def test_sides_of_all_else() -> None:
+    scene = box((0, 0, 0), (1, 1, 1))
+    assert Rig.frame(scene, DISPLAYS[0]) == Rig.frame(scene, DISPLAYS[0], "front")
+    for side, towards in (("front", (0, 0, 1)), ("left", (-1, 0, 0)), ("right", (1, 0, 0)), ("top", (0, 1, 0))):
+        assert np.argmax(np.array(Rig.frame(scene, DISPLAYS[0], side).position) * towards) == np.argmax(np.abs(towards))
+    with pytest.raises(aus.InputError, match="side: expected one of front, back, left"):
+        Rig.frame(scene, DISPLAYS[0], "behind")
+
+
 @pytest.mark.parametrize("center", [(0, 0, 0), (5, -3, 2), (1e6, 1e6, 1e6), (0, 0, -1e-12)])
 def test_a_point_has_a_rig(center: tuple) -> None:
     for display in DISPLAYS:

@@ -71,6 +71,7 @@ def test_phantom(tmp_path, capfd):
     write_series(tmp_path)
     volume = load_one(tmp_path)
     check_phantom(volume, direction=TURN)
+    assert volume.anatomical
     assert capfd.readouterr() == ("", "")
 
 

@@ -75,6 +75,19 @@ def test_nifti_is_ras_and_the_world_is_lps(tmp_path):
     check_phantom(load_one(path), origin=lps @ ORIGIN, direction=lps)
 
 
+def test_files_that_say_how_the_patient_lay_are_anatomical(tmp_path):
+    matrix = np.column_stack([np.diag(SPACING), ORIGIN])
+    known = nifti(matrix, phantom("<i2"))
+    unknown = known[:254] + bytes(2) + known[256:]  # sform_code 0
+    for name, data, expected in (("a.nii", known, True), ("b.nii", unknown, False)):
+        (tmp_path / name).write_bytes(data)
+        assert load_one(tmp_path / name).anatomical is expected
+    assert load_one(write(tmp_path / "c.nrrd", phantom())).anatomical
+    assert not load_one(write(tmp_path / "d.mha", phantom())).anatomical
+    np.save(tmp_path / "e.npy", phantom())
+    assert not load_one(tmp_path / "e.npy").anatomical
+
+
 def test_scaled_integers_become_float32(tmp_path):
     path = tmp_path / "a.nii"
     path.write_bytes(nifti(np.column_stack([np.eye(3), np.zeros(3)]), phantom("<i2"), slope=2.5, intercept=10))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,6 +21,8 @@ from .engines.options import Options
 from .errors import InputError, MemoryLimitError, UnsupportedError
 from .frame import Panel, ViewStack
 from .scene.scene import Scene
+from .scene.transfer import TransferFunction
+from .scene.volume import Volume
 
 MAX_SIDE = 65536
 MAX_VIEWS = 4096
@@ -130,16 +133,41 @@ class Renderer:
         schedule.draw_views(self.engine, self._prepared, draw, target)
         return ViewStack(target.color, target.depth, share(target, options))
 
-    def update(self, transform: Any = None) -> None:
-        """Give the scene's objects a new world_from_object transform (one for all, or one each) for the next frame."""
-        objects = self.scene.objects
-        given = np.asarray(transform, dtype=np.float64)
-        each = [given] * len(objects) if given.ndim == 2 else list(given)
-        if len(each) != len(objects):
-            raise InputError(f"transform: expected one (4, 4) matrix or {len(objects)} of them, got {given.shape}")
-        moved = tuple(replace(item, transform=matrix) for item, matrix in zip(objects, each, strict=True))
-        self.scene = replace(self.scene, objects=moved)
-        self._prepared = self.engine.prepare(self.scene)
+    def update(self, transform: Any = None, transfer: Any = None) -> None:
+        """Change what the next frame shows without preparing the rest again.
+
+        Parameters
+        ----------
+        transform : array_like of shape (4, 4) or (objects, 4, 4), optional
+            world_from_object, one for all objects or one each.
+        transfer : TransferFunction or sequence of them, optional
+            One for all volumes, or one each. Voxels are not read again, and gradients are not computed again.
+
+        Raises
+        ------
+        InputError
+            There are not as many as objects or volumes, or they are not of the kind above; nothing is changed then.
+        """
+        objects = list(self.scene.objects)
+        if transform is not None:
+            try:
+                given = np.asarray(transform, dtype=np.float64)
+            except (TypeError, ValueError):
+                raise InputError(f"transform: expected matrices of numbers, got {type(transform).__name__}") from None
+            each = [given] * len(objects) if given.ndim == 2 else list(given) if given.ndim == 3 else []
+            if len(each) != len(objects):
+                raise InputError(f"transform: expected one (4, 4) matrix or {len(objects)} of them, got {given.shape}")
+            objects = [replace(item, transform=matrix) for item, matrix in zip(objects, each, strict=True)]
+        if transfer is not None:
+            places = [k for k, item in enumerate(objects) if isinstance(item, Volume)]
+            functions = [transfer] * len(places) if isinstance(transfer, TransferFunction) else transfer
+            if not places or not isinstance(functions, Sequence) or len(functions) != len(places):
+                raise InputError(f"transfer: expected one TransferFunction or {len(places)} of them, one a volume")
+            for k, function in zip(places, functions, strict=True):
+                objects[k] = replace(objects[k], transfer=function)
+        scene = replace(self.scene, objects=tuple(objects))
+        self._prepared = self.engine.update(self._prepared, scene)
+        self.scene = scene
 
     def _array(self, name: str, out: Any, shape: tuple[int, ...], dtype: type) -> NDArray[Any]:
         """The array to draw into: the caller's, or one kept from frame to frame."""

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from ..display.display import Display
     from ..display.rig import Rig
+    from ..engines.options import Options
     from ..scene.scene import Scene
     from ..scene.volume import Volume
 
@@ -86,6 +87,12 @@ Transfer = Annotated[
     typer.Option("--transfer", metavar="NAME", help="Volumes: a .json, a preset such as ct-bone, or a colour map."),
 ]
 Mode = Annotated[str | None, typer.Option("--mode", help="Volumes: composite, mip or iso.")]
+Step = Annotated[float, typer.Option("--step", help="Volumes: distance of slices, in voxels.")]
+Rays = Annotated[str, typer.Option("--volume", help="Volumes: shared slabs for all views, or exact rays of their own.")]
+Alpha = Annotated[str, typer.Option("--alpha", help="Volumes: exact, or averaged over a pixel's three sub-pixels.")]
+Side = Annotated[
+    str, typer.Option("--from", metavar="SIDE", help="Look from the front, back, left, right, top or bottom.")
+]
 Iso = Annotated[float | None, typer.Option("--iso", metavar="VALUE", help="Volumes: the surface of this value.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", callback=_set_quiet, help="Say nothing but errors.")]
 
@@ -233,8 +240,20 @@ def working(text: str, total: int | None = None) -> Iterator[Callable[[], None]]
         yield lambda: progress.advance(task)
 
 
+def kernels_for(scene: Scene, panel: bool, options: Options) -> tuple[str, ...]:
+    """Names of the kernels that draw a scene, to panels or to views."""
+    kinds = {type(item).__name__ for item in scene.objects}
+    shared = kinds == {"Volume"} and len(scene.objects) == 1 and options.volume == "shared"
+    names = {
+        "Mesh": ("draw_views", "draw_panel"),
+        "Points": ("splat_views", "splat_panel"),
+        "Volume": ("draw_shared_rows", "draw_panel_rows") if shared else ("draw_rows", "draw_panel_rays"),
+    }
+    return tuple(f"{names[kind][panel]}-" for kind in sorted(kinds))  # "-": the whole name
+
+
 def announce_compilation(engine: str, *kernels: str) -> None:
-    """Say so when this is the run that compiles the kernels whose names begin so."""
+    """Say so when this is the run that compiles these kernels."""
     if engine not in ("auto", "cpu"):
         return
     from ..engines.cpu.jit import is_compiled
@@ -347,10 +366,20 @@ def load_scene(paths: list[Path], background: str | None, volumes: VolumeOptions
     return scene if color is None else replace(scene, background=color)
 
 
+def check_side(side: str, camera: Path | None) -> None:
+    """Refuse a side that is none, or that --camera makes meaningless."""
+    from ..display.framing import SIDES
+
+    if side not in SIDES:
+        raise InputError(f"--from: expected one of {', '.join(SIDES)}, got {side!r}")
+    if side != "front" and camera is not None:
+        raise InputError("--from: has no meaning with --camera, which says where the cameras stand")
+
+
 def frame_views(
-    scene: Scene, rig: Rig | None, views: int | None, size: tuple[int, int], display: str | None
+    scene: Scene, rig: Rig | None, views: int | None, size: tuple[int, int], display: str | None, side: str
 ) -> Rig:
-    """Return the cameras for a stack of views: `rig`, or ones that frame the scene; `views` of them."""
+    """Return the cameras for a stack of views: `rig`, or ones that frame the scene from `side`; `views` of them."""
     from ..display.display import Display
     from ..display.rig import Rig as RigClass
 
@@ -358,8 +387,8 @@ def frame_views(
         return rig if views is None else rig.with_views(views)
     if display is not None:
         where = Display.preset(display)
-        return RigClass.frame(scene, where if views is None else where.with_views(views))
-    return RigClass.frame(scene, Display.lenticular(*size, 8 if views is None else views))
+        return RigClass.frame(scene, where if views is None else where.with_views(views), side)
+    return RigClass.frame(scene, Display.lenticular(*size, 8 if views is None else views), side)
 
 
 def load_picture(path: Path, alpha: bool = False) -> NDArray[np.uint8]:

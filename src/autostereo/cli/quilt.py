@@ -31,6 +31,7 @@ def quilt(
         float | None, typer.Option("--aspect", help="Width/height of the display, if a tile's is another.")
     ] = None,
     camera: common.Camera = None,
+    side: common.Side = "front",
     background: common.Background = None,
     method: common.Method = "single-pass",
     engine: common.EngineName = "auto",
@@ -44,6 +45,8 @@ def quilt(
     transfer: common.Transfer = None,
     mode: common.Mode = None,
     iso: common.Iso = None,
+    step: common.Step = 1.0,
+    volume: common.Rays = "shared",
     quiet: common.Quiet = False,
 ) -> None:
     """Render a quilt: all views tiled into one picture.
@@ -60,20 +63,21 @@ def quilt(
 
     where = None if display is None else common.load_display(display)
     layout = choose_layout(where, grid, view_size, aspect)
-    options = Options(shading=shading, lighting=lighting, samples=samples)
+    options = Options(shading=shading, lighting=lighting, samples=samples, step=step, volume=volume)
     volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
+    common.check_side(side, camera)
     rig = common.load_camera(camera)
     from ..encoders.quilt import quilt_path
 
     path = common.check_image(quilt_path(output or Path(f"{common.stem(inputs[0])}.png"), layout))
     scene = common.load_scene(inputs, background, volumes)
-    rig = _frame(scene, where, layout) if rig is None else rig.with_views(layout.views)
+    rig = _frame(scene, where, layout, side) if rig is None else rig.with_views(layout.views)
     if rig.aspect is None:
         rig = replace(rig, aspect=layout.aspect)
     from ..encoders.quilt import save_quilt
     from ..render import render_views
 
-    common.announce_compilation(engine, "draw_views")
+    common.announce_compilation(engine, *common.kernels_for(scene, False, options))
     with common.working(f"rendering {rig.views} views"):
         stack = render_views(scene, rig, layout.tile, method=method, engine=engine, options=options)
     with common.working("writing"):
@@ -102,8 +106,8 @@ def choose_layout(display: Display | None, grid: str | None, view_size: str | No
     return Quilt(columns, rows, columns * width, rows * height, aspect)
 
 
-def _frame(scene: Scene, display: Display | None, layout: Quilt) -> Rig:
-    """Cameras that frame the scene: for the display, or for a panel of the shape of a tile."""
+def _frame(scene: Scene, display: Display | None, layout: Quilt, side: str) -> Rig:
+    """Cameras that frame the scene from `side`: for the display, or for a panel of the shape of a tile."""
     from ..display.display import Display
     from ..display.rig import Rig
 
@@ -113,4 +117,4 @@ def _frame(scene: Scene, display: Display | None, layout: Quilt) -> Rig:
         display = Display.lenticular(max(1, round(height * layout.aspect)), height, layout.views)
     elif display.views != layout.views:
         display = display.with_views(layout.views)
-    return Rig.frame(scene, replace(display, quilt=layout))
+    return Rig.frame(scene, replace(display, quilt=layout), side)

@@ -16,6 +16,7 @@ def render(
     size: common.Size = None,
     swap: common.Swap = False,
     camera: common.Camera = None,
+    side: common.Side = "front",
     views: common.ViewCount = None,
     continuous: common.Continuous = False,
     background: common.Background = None,
@@ -32,6 +33,9 @@ def render(
     transfer: common.Transfer = None,
     mode: common.Mode = None,
     iso: common.Iso = None,
+    step: common.Step = 1.0,
+    volume: common.Rays = "shared",
+    alpha: common.Alpha = "exact",
     quiet: common.Quiet = False,
 ) -> None:
     """Render scene files to the interlaced picture of a display.
@@ -44,22 +48,26 @@ def render(
       autostereo render room.glb lamp.glb -d visual.json -o room.png
       autostereo render bunny.ply -d alioscopy-8 --swap --background white --samples 4
       autostereo render bunny.ply -d my_panel.toml --size 3840x2160 --camera rig.json
-      autostereo render head.nii.gz -d looking-glass-portrait --transfer ct-bone
+      autostereo render head.nii.gz -d looking-glass-portrait --transfer ct-bone --from left
       autostereo render engine.raw --shape 256x256x128 --dtype uint8 -d alioscopy-8 --iso 120
     """
     from ..engines.options import Options
 
     where = common.load_display(display, size, swap, views, continuous)
-    options = Options(shading=shading, lighting=lighting, sampling=sampling, samples=samples)
+    look = {"shading": shading, "lighting": lighting, "sampling": sampling, "samples": samples}
+    options = Options(**look, step=step, volume=volume, alpha=alpha)  # type: ignore[arg-type]
     volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
+    common.check_side(side, camera)
     rig = common.load_camera(camera)
     path = common.check_image(output or Path(f"{common.stem(inputs[0])}_{common.slug(display)}.png"))
     scene = common.load_scene(inputs, background, volumes)
 
+    from ..display.rig import Rig
     from ..render import render as draw
 
+    rig = rig or Rig.frame(scene, where, side)
     one_pass = where.viewmap is not None and method == "single-pass"
-    common.announce_compilation(engine, "draw_panel" if one_pass else "draw_views")
+    common.announce_compilation(engine, *common.kernels_for(scene, one_pass, options))
     start = perf_counter()
     with common.working("rendering"):
         panel = draw(scene, where, rig, method=method, engine=engine, options=options)

@@ -23,6 +23,7 @@ def views(
     size: common.Size = None,
     display: common.OptionalDisplayName = None,
     camera: common.Camera = None,
+    side: common.Side = "front",
     background: common.Background = None,
     method: common.Method = "single-pass",
     engine: common.EngineName = "auto",
@@ -37,6 +38,8 @@ def views(
     transfer: common.Transfer = None,
     mode: common.Mode = None,
     iso: common.Iso = None,
+    step: common.Step = 1.0,
+    volume: common.Rays = "shared",
     quiet: common.Quiet = False,
 ) -> None:
     """Render the single views, from left to right.
@@ -61,16 +64,18 @@ def views(
     common.check_views(views)
     if suffix in ANIMATIONS:
         check_animation(output, pixels)
-    options = Options(shading=shading, lighting=lighting, samples=samples, depth=depth)
+    look = {"shading": shading, "lighting": lighting, "samples": samples, "depth": depth}
+    options = Options(**look, step=step, volume=volume)  # type: ignore[arg-type]
     volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
+    common.check_side(side, camera)
     rig = common.load_camera(camera)
     common.check_output(output, (suffix,) if suffix else ())
     scene = common.load_scene(inputs, background, volumes)
-    rig = common.frame_views(scene, rig, views, pixels, display)
+    rig = common.frame_views(scene, rig, views, pixels, display, side)
 
     from ..render import render_views
 
-    common.announce_compilation(engine, "draw_views")
+    common.announce_compilation(engine, *common.kernels_for(scene, False, options))
     with common.working(f"rendering {rig.views} views"):
         stack = render_views(scene, rig, pixels, method=method, engine=engine, options=options)
     with common.working("writing", None):

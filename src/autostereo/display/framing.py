@@ -16,6 +16,24 @@ from .rig import Rig
 MARGIN = 0.05  # share of the half-window left free at every side
 CLOSEST = 1.25  # least distance from the bounds' centre, in half-depths of the bounds: near ≥ a fifth of it
 LARGEST = 1e15
+# where cameras may stand, and which way is up: (towards them, up)
+SIDES = {
+    "front": ((0, 0, 1), (0, 1, 0)),
+    "back": ((0, 0, -1), (0, 1, 0)),
+    "left": ((-1, 0, 0), (0, 1, 0)),
+    "right": ((1, 0, 0), (0, 1, 0)),
+    "top": ((0, 1, 0), (0, 0, -1)),
+    "bottom": ((0, -1, 0), (0, 0, 1)),
+}
+# the same of a patient whose x runs to the left, y to the back, z to the head
+PATIENT_SIDES = {
+    "front": ((0, -1, 0), (0, 0, 1)),
+    "back": ((0, 1, 0), (0, 0, 1)),
+    "left": ((1, 0, 0), (0, 0, 1)),
+    "right": ((-1, 0, 0), (0, 0, 1)),
+    "top": ((0, 0, 1), (0, -1, 0)),
+    "bottom": ((0, 0, -1), (0, -1, 0)),
+}
 
 
 @dataclass(frozen=True)
@@ -52,10 +70,11 @@ class DepthBudget:
         return max(abs(self.disparity_near), abs(self.disparity_far)) <= self.comfort
 
 
-def frame_rig(scene: Any, display: Display) -> Rig:
+def frame_rig(scene: Any, display: Display, side: str = "front") -> Rig:
     """Choose a rig for `scene`, anything with world bounds `.bounds` (2, 3), on `display`.
 
-    The cameras look along −z at the bounds' centre with the display's `fov_y`. The focal plane is balanced,
+    The cameras look at the bounds' centre from `side` with the display's `fov_y`: from the front along −z, y up, or,
+    if some object of the scene is `anatomical`, along y, z up. The focal plane is balanced,
     1/F = (1/near + 1/far)/2, so that the nearest and farthest depth have opposite disparities of one size. The baseline
     is the smaller of what the display's cone spans at the focal plane, 2·F·tan(cone/2), and what keeps the disparity
     between adjacent views within `comfort` pixels of `comfort_size`. The distance is the least from which the whole box
@@ -66,7 +85,11 @@ def frame_rig(scene: Any, display: Display) -> Rig:
     coordinate runs half a step beyond them, the fit covers that.
     """
     center, half = _box(scene)
-    hx, hy, hz = half
+    if side not in SIDES:
+        raise InputError(f"side: expected one of {', '.join(SIDES)}, got {side!r}")
+    anatomical = any(getattr(item, "anatomical", False) for item in getattr(scene, "objects", (scene,)))
+    towards, up = (PATIENT_SIDES if anatomical else SIDES)[side]
+    hx, hy, hz = (float(np.abs(axis) @ half) for axis in (np.cross(up, towards), up, towards))
     steps = max(display.views - 1, 1)
     tan_y = math.tan(math.radians(display.fov_y) / 2)
     tan_x = tan_y * display.aspect
@@ -89,8 +112,9 @@ def frame_rig(scene: Any, display: Display) -> Rig:
     delta = hz / distance
     share = by_cone if by_cone * delta <= by_comfort else by_comfort / delta
     return Rig(
-        position=(center[0], center[1], center[2] + distance),
+        position=tuple(c + distance * t for c, t in zip(center, towards, strict=True)),  # type: ignore[arg-type]
         target=center,
+        up=up,
         fov_y=display.fov_y,
         focal_distance=focal,
         baseline=2 * focal * share,

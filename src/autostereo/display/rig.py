@@ -162,15 +162,16 @@ class Rig:
         return replace(self, views=views)
 
     @classmethod
-    def frame(cls, scene: Any, display: Display) -> Rig:
+    def frame(cls, scene: Any, display: Display, side: str = "front") -> Rig:
         """Choose a rig that shows the whole of `scene` in every view of `display`, comfortably.
 
         The whole bounding box is in view in every view, and the disparity between adjacent views stays within
-        the display's comfort limit (displays.md 3.4).
+        the display's comfort limit (displays.md 3.4). Cameras stand at `side`: front, back, left, right, top or bottom;
+        of a patient if a volume is `anatomical`.
         """
         from .framing import frame_rig
 
-        return frame_rig(scene, display)
+        return frame_rig(scene, display, side)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the fields as JSON."""

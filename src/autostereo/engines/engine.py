@@ -96,6 +96,9 @@ class Engine(Protocol):
     def prepare(self, scene: Scene) -> Any:
         """Turn a scene into what this engine draws fastest."""
 
+    def update(self, prepared: Any, scene: Scene) -> Any:
+        """Return `prepared` for the same objects under other transforms and transfer functions."""
+
     def draw(self, prepared: Any, draw: Draw, target: Target) -> None:
         """Fill `target`."""
 

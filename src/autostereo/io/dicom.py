@@ -113,7 +113,8 @@ def _load_series(sitk: Any, path: Path, files: list[str], hints: Hints) -> Volum
     gap = float(np.linalg.norm(step))
     values = _read_slices(sitk, path, chosen)
     direction = np.column_stack([first.axes, step / gap])  # of a tilted gantry the third is not the normal
-    return make_volume(values, hints, (*first.spacing, gap), origin=chosen[0].origin, direction=direction)
+    place = {"origin": chosen[0].origin, "direction": direction, "anatomical": True}
+    return make_volume(values, hints, (*first.spacing, gap), **place)
 
 
 def _locate(sitk: Any, file: str) -> _Slice:
@@ -196,7 +197,8 @@ def _load_multiframe(sitk: Any, path: Path, file: str, hints: Hints) -> Volume:
     hints.choose(1, path)
     direction = np.reshape(image.GetDirection(), (3, 3))
     values = sitk.GetArrayFromImage(image)
-    return make_volume(values, hints, image.GetSpacing(), origin=image.GetOrigin(), direction=direction)
+    place = {"origin": image.GetOrigin(), "direction": direction, "anatomical": True}
+    return make_volume(values, hints, image.GetSpacing(), **place)
 
 
 def _load_pictures(path: Path, hints: Hints) -> Volume:

@@ -2,8 +2,9 @@
 
 World frame. NIfTI and NRRD files say where patient left, posterior and superior are; ITK turns every such file into
 one frame, LPS: x to the patient's left, y to posterior, z to superior (a NIfTI header itself is written for RAS: its
-x and y are negated). Lengths are what the file says, usually millimetres. Files that know of no patient (MetaImage,
-VTK, TIFF, raw) keep their own axes: x along a row, y from row to row, z from slice to slice.
+x and y are negated); their volumes are `anatomical`. Lengths are what the file says, usually millimetres. Files that
+know of no patient (MetaImage, VTK, TIFF, raw) keep their own axes: x along a row, y from row to row, z from slice to
+slice.
 """
 
 from __future__ import annotations
@@ -207,7 +208,16 @@ def _read_itk(sitk: Any, file: Path, path: Path, hints: Hints) -> Volume:
         reader.SetExtractIndex([0, 0, 0, *map(int, later)])
     values = sitk.GetArrayFromImage(reader.Execute())
     direction = np.reshape(reader.GetDirection(), (axes, axes))[:3, :3]
-    return make_volume(values, hints, reader.GetSpacing()[:3], origin=reader.GetOrigin()[:3], direction=direction)
+    place = {"origin": reader.GetOrigin()[:3], "direction": direction, "anatomical": _is_anatomical(reader)}
+    return make_volume(values, hints, reader.GetSpacing()[:3], **place)
+
+
+def _is_anatomical(reader: Any) -> bool:
+    """Whether a file says how its axes lie in a patient."""
+    known = {name: reader.GetMetaData(name) for name in reader.GetMetaDataKeys()}
+    if "NRRD_space" in known:
+        return bool(re.match(r"(left|right)-(anterior|posterior)-|[LR][AP]S", known["NRRD_space"]))
+    return any(known.get(name, "0").strip() not in ("", "0") for name in ("qform_code", "sform_code"))
 
 
 def _reason(path: Path, error: Exception) -> str:

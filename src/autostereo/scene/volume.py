@@ -93,6 +93,9 @@ class Volume:
         (a, b, c, d): only where a·x + b·y + c·z + d ≥ 0 something is seen; the same coordinates.
     gradient : {"central", "sobel"}
         Central differences, or the 3×3×3 Sobel operator (smoother).
+    anatomical : bool
+        The world's axes are a patient's, LPS: x to the left, y to the back, z to the head. `Rig.frame` then looks from
+        the patient's front, head up.
 
     Raises
     ------
@@ -113,6 +116,7 @@ class Volume:
     clip_box: NDArray | None = None  # (2, 3) float64
     clip_plane: NDArray | None = None  # (4,) float64
     gradient: str = "central"
+    anatomical: bool = False
     value_range: tuple[float, float] = field(init=False)  # least and greatest value
 
     def __post_init__(self) -> None:
@@ -130,8 +134,9 @@ class Volume:
         for name, choices in (("mode", MODES), ("gradient", GRADIENTS)):
             if getattr(self, name) not in choices:
                 raise InputError(f"{name}: expected one of {', '.join(choices)}, got {getattr(self, name)!r}")
-        if not isinstance(self.shade, (bool, np.bool_)):
-            raise InputError(f"shade: expected True or False, got {self.shade!r}")
+        for name in ("shade", "anatomical"):
+            if not isinstance(getattr(self, name), (bool, np.bool_)):
+                raise InputError(f"{name}: expected True or False, got {getattr(self, name)!r}")
         if self.material is None:
             put(self, "material", Material())
         elif not isinstance(self.material, Material):

@@ -18,7 +18,7 @@ from .memory import Memory
 from .mesh import PreparedMeshes, draw_mesh_panel, draw_mesh_views, prepare_meshes
 from .points import PointArrays, draw_points_panel, draw_points_views, prepare_points
 from .scene_arrays import background_word
-from .volume import PreparedVolumes, draw_volume_panel, draw_volume_views, prepare_volumes
+from .volume import PreparedVolumes, draw_volume_panel, draw_volume_views, prepare_volumes, update_volumes
 
 
 @dataclass(eq=False)
@@ -60,6 +60,21 @@ class CpuEngine:
             prepare_volumes(scene, volumes) if volumes else None,
         )
 
+    def update(self, prepared: Prepared, scene: Scene) -> Prepared:
+        """The same objects under other transforms and transfer functions."""
+        pairs = zip(prepared.scene.objects, scene.objects, strict=True)
+        changed = {type(new) for old, new in pairs if new is not old}
+        meshes = [item for item in scene.objects if isinstance(item, Mesh)]
+        points = [item for item in scene.objects if isinstance(item, Points)]
+        volumes = [item for item in scene.objects if isinstance(item, Volume)]
+        return replace(
+            prepared,
+            scene=scene,
+            meshes=prepare_meshes(scene, meshes) if Mesh in changed else prepared.meshes,
+            points=prepare_points(points) if Points in changed else prepared.points,
+            volumes=prepared.volumes if prepared.volumes is None else update_volumes(prepared.volumes, scene, volumes),
+        )
+
     def draw(self, prepared: Prepared, draw: Draw, target: Target) -> None:
         """Draw a stack of views, or straight to the panel."""
         with prepared.lock:
@@ -77,9 +92,10 @@ class CpuEngine:
         sums = np.zeros(target.color.shape, np.uint16)
         nearest = None if target.depth is None else np.full(target.depth.shape, np.inf, np.float32)
         options = replace(draw.options, samples=1)
+        wide = 1 / 3 if draw.viewmap is not None and draw.options.sampling == "subpixel" else 1.0
         for k in range(side * side):
             x, y = (k % side + 0.5) / side, (k // side + 0.5) / side
-            camera = replace(draw.camera, shift=(0.5 - x, 0.5 - y))
+            camera = replace(draw.camera, shift=(wide * (0.5 - x), 0.5 - y))
             self._draw_stages(prepared, replace(draw, camera=camera, options=options), target)
             sums += target.color
             if nearest is not None and target.depth is not None:

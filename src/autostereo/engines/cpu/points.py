@@ -146,6 +146,7 @@ def splats_at(
     view = View(e, turn, float(low), float(high), lights, own_eye)
     records = buffers.buffer("surfels", (count, WORDS), np.float32)
     ranges = buffers.buffer("surfel ranges", (count, 4), np.int32)
+    backs = buffers.buffer("surfel backs", (count, 3), np.float32)
     words = records.view(np.int32)
 
     # a few chunks, each with its own cursors: bins are filled in parallel and keep the order of surfels
@@ -156,7 +157,8 @@ def splats_at(
 
     def place(first: int, end: int) -> None:
         for c in range(first, end):
-            place_surfels((edges[c], edges[c + 1]), arrays, view, camera, grid, records, words, ranges, counts[c])
+            span = edges[c], edges[c + 1]
+            place_surfels(span, arrays, view, camera, grid, records, words, backs, ranges, counts[c])
 
     run_rows(chunks, place, 1)
     bin_start = np.zeros(blocks + 1, np.int64)
@@ -169,4 +171,4 @@ def splats_at(
             fill_bins((edges[c], edges[c + 1]), ranges, grid.blocks, cursors[c], bins)
 
     run_rows(chunks, fill, 1)
-    return Splats(records, words, bin_start, bins, arrays.materials, lights, own_eye)
+    return Splats(records, words, backs, bin_start, bins, arrays.materials, lights, own_eye)

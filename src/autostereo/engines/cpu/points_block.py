@@ -23,12 +23,13 @@ CLOSER = np.float32(1.0 - 1e-5)  # rounding brings a sample nearer by less than 
 class Splats(NamedTuple):
     """The surfels in sight.
 
-    records, words: see points_setup; bin_start (B + 1,), bins: numbers of each block's surfels; materials (M, 4) and
-    lights (L, 8) float32; own_eye: highlights are those that each view sees.
+    records, words, backs: see points_setup; bin_start (B + 1,), bins: numbers of each block's surfels; materials (M, 4)
+    and lights (L, 8) float32; own_eye: sides and highlights are those that each view sees.
     """
 
     records: np.ndarray
     words: np.ndarray
+    backs: np.ndarray
     bin_start: np.ndarray
     bins: np.ndarray
     materials: np.ndarray
@@ -76,7 +77,7 @@ def draw_surfels(draw_chord, is_hidden, place, stage, bounds, splats, camera, sc
             nearest = CLOSER * depth * (ONE - reach) - (depth * reach if blending else ZERO)
             if is_hidden(place, nearest, record, lens, (row0 - bounds[0], row1 - bounds[0]), scratch):
                 continue
-        parts, material = words[i, PARTS] & np.int32(15), np.uint64(words[i, PARTS] >> MATERIAL)
+        parts, material = words[i, PARTS] & np.int32((1 << MATERIAL) - 1), np.uint64(words[i, PARTS] >> MATERIAL)
         done = 0
         for r in range(row0, row1):
             y = np.float32(r) + np.float32(0.5)

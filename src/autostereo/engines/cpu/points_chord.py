@@ -12,6 +12,9 @@ n > 0 and m > 0. That is all of the ray–splat intersection (Hübner 2007b, sec
 
 A disc that appears less than a pixel wide in a view, and one without a normal, lies in the plane of constant depth:
 its chords have z1 = z2, and move with its centre.
+
+Discs have two sides. A record's normal is turned to one of the cameras; those who look at the other side see the
+chord the other way round (BACK), and the disc lit from there.
 """
 
 from __future__ import annotations
@@ -19,7 +22,7 @@ from __future__ import annotations
 import numpy as np
 
 from .jit import inlined
-from .points_setup import BACK, BARE, DEPTH, INVERSE, LEAST_RADIUS, ND, NX, NY, REACH, SMALL, A, B, X, Y
+from .points_setup import BACK, DEPTH, INVERSE, LEAST_RADIUS, ND, NX, NY, REACH, SMALL, A, B, X, Y
 from .scalars import ONE, TINY, ZERO, exp2_fast, log2_fast
 
 FOUR, HALF, QUARTER = np.float32(4.0), np.float32(0.5), np.float32(0.25)
@@ -90,10 +93,10 @@ def cut_disc(record, y, lens, back):
 
 
 @inlined
-def cut_circle(record, y, lens, least):
-    """The chord of a disc of constant depth whose radius is at least so many pixels."""
+def cut_circle(record, y, lens):
+    """The chord of a disc of constant depth whose radius is at least LEAST_RADIUS pixels."""
     fx, fy, scale, _ = lens
-    rx, ry = max(fx * record[REACH], least), max(fy * record[REACH], least)
+    rx, ry = max(fx * record[REACH], LEAST), max(fy * record[REACH], LEAST)
     across = (y - record[Y]) / ry
     share = ONE - across * across
     if not share > ZERO:
@@ -110,7 +113,7 @@ def cut(record, part, y, lens):
     chord = (x1, p1, x2, p2, z1, z2, weight, first, last), see above and `cut_disc`.
     """
     if part >= SMALL:
-        return cut_circle(record, y, lens, ZERO if part == BARE else LEAST)
+        return cut_circle(record, y, lens)
     return cut_disc(record, y, lens, part == BACK)
 
 
@@ -146,12 +149,19 @@ def shine_of(offset, place, normal, light, shininess):
 
 
 @inlined
+def sees_front(offset, record):
+    """Whether the camera at `offset` looks at the side of a disc that its record's normal points to."""
+    across = record[NY] * record[B] + record[ND]
+    return record[NX] * (record[A] - offset * record[INVERSE]) + across <= ZERO
+
+
+@inlined
 def light_at(k, record, lens_offset, lights):
-    """Unit vector from a surfel's centre towards light k, and whether the surfel faces it."""
+    """Unit vector from a surfel's centre towards light k, and on which side of the surfel it is: > 0 in front."""
     tx, ty, td = lights[k, 1], lights[k, 2], lights[k, 3]
     if lights[k, 0] != ZERO:
         d = record[DEPTH]
         tx, ty, td = tx - record[A] * d, ty - (record[B] * d + lens_offset), td - d
         scale = ONE / np.sqrt(max(tx * tx + ty * ty + td * td, TINY))
         tx, ty, td = tx * scale, ty * scale, td * scale
-    return (tx, ty, td), record[NX] * tx + record[NY] * ty + record[ND] * td > ZERO
+    return (tx, ty, td), record[NX] * tx + record[NY] * ty + record[ND] * td

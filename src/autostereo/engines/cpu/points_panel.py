@@ -15,8 +15,8 @@ from .jit import inlined, kernel
 from .panel_lines import LinePlan, make_lines, row_offsets
 from .panel_list import ADDRESS, COLOR, LANE_OFFSET, LANE_U, LANE_X, LANE_Z, Block, draw_stretch, place_samples
 from .points_block import BLEND, draw_surfels, middle_depth, swath
-from .points_chord import depth_of, is_small, light_at, shine_of, weight_of
-from .points_setup import BLUE, DEPTH, FRONT, GREEN, ND, NX, NY, REACH, RED, SMALL, A, B
+from .points_chord import depth_of, is_small, light_at, sees_front, shine_of, weight_of
+from .points_setup import BLUE, DEPTH, FRONT, GREEN, ND, NX, NY, REACH, RED, SIDES, SMALL, A, B
 from .scalars import ONE, ZERO, quantize, whole_steps
 
 PLANE = np.uint64(12288 + 5 * 16)  # samples of a block; planes must not fall onto the same cache sets
@@ -39,6 +39,7 @@ class Place(NamedTuple):
     columns: int
     at: tuple
     lens_offset: np.float32
+    backs: np.ndarray
     materials: np.ndarray
     lights: np.ndarray
     own_eye: bool
@@ -78,27 +79,39 @@ def mask_small(n, wanted, record, lens, lists):
 
 
 @inlined
-def list_colors(n, row, place, record, material, lists, ints):
-    """Colour of a surfel at the listed samples, each that of its own channel."""
+def list_colors(n, row, place, surfel, lists, ints):
+    """Colour of a surfel at the listed samples, each that of its own channel and of the side which it sees."""
+    record, number, _, parts, material, _ = surfel
     begin = np.int32(row) * np.int32(3) * np.int32(place.columns)
     green, blue = np.int32(place.columns), np.int32(2 * place.columns)
     r, g, b = record[RED], record[GREEN], record[BLUE]
     for i in range(n):
         k = np.int32(ints[ADDRESS + i] - begin)
         lists[COLOR + i] = r if k < green else (g if k < blue else b)
+    both = parts & SIDES != 0
+    if both:
+        i = np.uint64(number)
+        r, g, b = place.backs[i, 0], place.backs[i, 1], place.backs[i, 2]
+        for i in range(n):
+            k = np.int32(ints[ADDRESS + i] - begin)
+            back = r if k < green else (g if k < blue else b)
+            lists[COLOR + i] = lists[COLOR + i] if sees_front(lists[LANE_OFFSET + i], record) else back
     specular, shininess, lights = place.materials[material, 2], place.materials[material, 3], place.lights
     if specular == ZERO or not place.own_eye:
         return
     d = record[DEPTH]
     centre = (record[A] * d, record[B] * d, d)
-    normal = (record[NX], record[NY], record[ND])
     for q in range(lights.shape[0]):
-        light, faces = light_at(q, record, place.lens_offset, lights)
-        if not faces:
+        light, side = light_at(q, record, place.lens_offset, lights)
+        if side == ZERO or (side < ZERO and not both):
             continue
+        sign = ONE if side > ZERO else -ONE
+        normal = (sign * record[NX], sign * record[NY], sign * record[ND])
         r, g, b = specular * lights[q, 4], specular * lights[q, 5], specular * lights[q, 6]
         for i in range(n):
-            shine = shine_of(lists[LANE_OFFSET + i], centre, normal, light, shininess)
+            offset = lists[LANE_OFFSET + i]
+            shine = shine_of(offset, centre, normal, light, shininess)
+            shine = shine if not both or sees_front(offset, record) == (side > ZERO) else ZERO
             k = np.int32(ints[ADDRESS + i] - begin)
             lists[COLOR + i] += shine * (r if k < green else (g if k < blue else b))
 
@@ -133,7 +146,8 @@ def add_weights(n, number, reach, lists, ints, planes):
 @inlined
 def draw_listed(n, place, row, ends, what, scratch):
     """Draw a chord at the listed samples; what = (blending, surfel, chord)."""
-    blending, (record, number, part, parts, material, lens), chord = what
+    blending, surfel, chord = what
+    record, number, part, parts, _, lens = surfel
     lists, ints, planes = scratch.lists, scratch.ints, scratch.planes
     whole = whole_steps(n)
     place_samples(whole, row, place, lists, ints)
@@ -144,7 +158,7 @@ def draw_listed(n, place, row, ends, what, scratch):
     if parts & SMALL and parts & FRONT:
         mask_small(whole, part == SMALL, record, lens, lists)
     if blending:
-        list_colors(whole, row, place, record, material, lists, ints)
+        list_colors(whole, row, place, surfel, lists, ints)
         add_weights(n, number, record[REACH] * record[DEPTH], lists, ints, planes)
     else:
         keep_nearest(n, lists, ints, planes)
@@ -241,7 +255,7 @@ def splat_panel(span, grid, splats, camera, panel, block, scratch, color, depth)
             make_lines(line, width, flip, columns, base, first, plane, plan, starts, lines, addresses, *found)
             load_depths(line, base, columns, flip, plane, depth, scratch.planes)
         materials, lights, own_eye = splats.materials, splats.lights, splats.own_eye
-        place = Place(block, plan, first, plane, at, lens_offset, materials, lights, own_eye)
+        place = Place(block, plan, first, plane, at, lens_offset, splats.backs, materials, lights, own_eye)
         bounds = (rows[0], rows[1], start, end, middle_depth(start, end, splats))
         for stage in range(BLEND):
             draw_surfels(draw_chord, is_hidden, place, stage, bounds, splats, camera, scratch)

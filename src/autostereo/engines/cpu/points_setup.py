@@ -18,7 +18,8 @@ PARTS, ROW0, ROW1 = 13, 14, 15  # int32
 WORDS = 16
 
 FRONT, BACK, SMALL, BARE = 1, 2, 4, 8  # which of its shapes a surfel takes in some view, see points_chord
-MATERIAL = 4  # PARTS holds the number of its material from this bit on
+SIDES = 16  # some views may see one side of it, some the other
+MATERIAL = 5  # PARTS holds the number of its material from this bit on
 
 LEAST_RADIUS = 0.71  # pixels: every disc of it, just over √½, holds a pixel's centre
 LARGEST = 1e5  # radius as a multiple of depth: what is seen of a larger disc is seen of this one
@@ -36,7 +37,8 @@ class View(NamedTuple):
     """Eye space, and for whom surfels are seen and lit.
 
     eye_from_world (4, 4) and that of normals (3, 3), float64; range of camera offsets; lights (L, 8) float32, see
-    scene_arrays.light_array; own_eye: highlights are left to those who know the view.
+    scene_arrays.light_array; own_eye: every view sees its own side of a surfel, and highlights, which are left to those
+    who know the view; else all see what the centre camera does.
     """
 
     eye_from_world: np.ndarray
@@ -61,9 +63,10 @@ def bounds_of(q0, q1, q2, low, high):
 
 @inlined
 def parts_of(normal, a, b, radii, across):
-    """Shapes that a disc takes in views that see it at a·d, b·d, a in a[0] … a[1]: see points_chord.is_small.
+    """Shapes that a disc takes in views that see it at a·d, b·d, a in a[0] … a[1], and whether SIDES.
 
-    radii: in pixels, in x and y; across = n·(0, b, 1). Where rounding might decide, all shapes are possible.
+    See points_chord.is_small; radii: in pixels, in x and y; across = n·(0, b, 1). Where rounding might decide, all
+    shapes are possible.
     """
     nx, ny, nd = normal
     rx, ry = radii[0] * radii[0], radii[1] * radii[1]
@@ -84,10 +87,10 @@ def parts_of(normal, a, b, radii, across):
     slack = 1e-5 * (1.0 + s1 + rx * ry * (across * across + nx * nx * max(a[0] * a[0], a[1] * a[1])))
     if s0 > 0.5 + slack and p0 > slack:
         return FRONT
+    sides = 0 if max(nx * a[0] + across, nx * a[1] + across) < -1e-6 else SIDES
     if s1 < 0.5 - slack or p1 < -slack:
-        return SMALL
-    faces = max(nx * a[0] + across, nx * a[1] + across) < 0.0
-    return FRONT | SMALL if faces else FRONT | BACK | SMALL
+        return SMALL | sides
+    return FRONT | SMALL | (BACK | sides if sides else 0)
 
 
 @inlined
@@ -109,7 +112,7 @@ def extent(p, n, nd, reach):
 
 @inlined
 def light_surfel(place, normal, color, material, view, offset_y):
-    """Colour of a surfel lit at its centre; without highlights if every eye sees its own."""
+    """Colour of a surfel lit at its centre on one side; without highlights if every eye sees its own."""
     px, py, d = place
     nx, ny, nd = normal
     r, g, b = material[0], material[0], material[0]
@@ -137,12 +140,13 @@ def light_surfel(place, normal, color, material, view, offset_y):
 
 
 @kernel
-def place_surfels(span, arrays, view, camera, grid, records, words, ranges, counts):
+def place_surfels(span, arrays, view, camera, grid, records, words, backs, ranges, counts):
     """Bring surfels span[0] … span[1] before the cameras, and count how many touch each block of the picture.
 
-    records (N, 16) float32 and words, its bits as int32: see X, Y, …; ranges (N, 4) int32: bands and blocks of the
-    picture that they may touch from some camera, first and last + 1; none for those out of sight and those whose
-    centre is in front of the near plane; counts (bands·blocks,).
+    records (N, 16) float32 and words, its bits as int32: see X, Y, …; backs (N, 3) float32: colours of the other sides,
+    of surfels with SIDES; ranges (N, 4) int32: bands and blocks of the picture that they may touch from some camera,
+    first and last + 1; none for those out of sight and those whose centre is in front of the near plane; counts
+    (bands·blocks,).
     """
     e, m = view.eye_from_world, view.turn
     scale = 1.0 / camera.focal
@@ -167,7 +171,8 @@ def place_surfels(span, arrays, view, camera, grid, records, words, ranges, coun
         length = np.sqrt(nx * nx + ny * ny + nd * nd)
         bare = not length > 0.0
         turned = 1.0 / max(length, 1e-300)
-        if nx * a + ny * b + nd > 0.0:  # two-sided: turned to the centre camera
+        middle = min(max(0.0, view.low), view.high)  # two-sided: turned to the centre camera, or the one next to it
+        if nx * (a - middle * inverse) + ny * b + nd > 0.0:
             turned = -turned
         nx, ny, nd = nx * turned, ny * turned, nd * turned
         if bare:
@@ -180,7 +185,7 @@ def place_surfels(span, arrays, view, camera, grid, records, words, ranges, coun
         parts = BARE
         if not bare:
             parts = parts_of((nx, ny, nd), (a_low, a_high), b, (rx, ry), ny * b + nd)
-        if parts & SMALL:
+        if parts & (SMALL | BARE):
             left, right = min(left, -LEAST_RADIUS), max(right, LEAST_RADIUS)
             top, bottom = min(top, -LEAST_RADIUS), max(bottom, LEAST_RADIUS)
         if parts & FRONT:
@@ -205,7 +210,13 @@ def place_surfels(span, arrays, view, camera, grid, records, words, ranges, coun
             np.float64(arrays.materials[number, 3]),
         )
         color = (np.float64(arrays.colors[i, 0]), np.float64(arrays.colors[i, 1]), np.float64(arrays.colors[i, 2]))
-        red, green, blue = light_surfel((px, py, d), (nx, ny, nd), color, material, view, camera.offset_y)
+        away = not view.own_eye and nx * a + ny * b + nd > 0.0  # lit on the side that the centre camera sees
+        facing = (-nx, -ny, -nd) if away else (nx, ny, nd)
+        red, green, blue = light_surfel((px, py, d), facing, color, material, view, camera.offset_y)
+        if parts & SIDES:
+            behind = (-nx, -ny, -nd) if view.own_eye else facing
+            seen = light_surfel((px, py, d), behind, color, material, view, camera.offset_y)
+            backs[i, 0], backs[i, 1], backs[i, 2] = seen
         records[i, X], records[i, Y], records[i, DEPTH], records[i, REACH] = x, y, d, reach
         records[i, NX], records[i, NY], records[i, ND] = nx, ny, nd
         records[i, RED], records[i, GREEN], records[i, BLUE] = red, green, blue

@@ -16,8 +16,8 @@ import numpy as np
 from .jit import inlined, kernel
 from .panel_list import STRIDE
 from .points_block import BLEND, CLOSER, TWO, draw_surfels, middle_depth, swath
-from .points_chord import depth_of, is_small, light_at, shine_of, weight_of
-from .points_setup import BLUE, DEPTH, FRONT, GREEN, ND, NX, NY, REACH, RED, SMALL, A, B
+from .points_chord import depth_of, is_small, light_at, sees_front, shine_of, weight_of
+from .points_setup import BLUE, DEPTH, FRONT, GREEN, ND, NX, NY, REACH, RED, SIDES, SMALL, A, B
 from .scalars import ALPHA, HALF, ONE, ZERO, quantize, whole_steps
 
 VIEWS_AT_ONCE = 256
@@ -65,6 +65,7 @@ class Place(NamedTuple):
     end: np.float32
     stride: np.int32
     lens_offset: np.float32
+    backs: np.ndarray
     materials: np.ndarray
     lights: np.ndarray
     own_eye: bool
@@ -78,8 +79,8 @@ def find_small(views, first_view, record, lens, offsets, lists):
 
 
 @inlined
-def find_colors(place, record, material, lists):
-    """Colour of a surfel in each view."""
+def find_colors(place, number, parts, record, material, lists):
+    """Colour of a surfel in each view: that of the side which it sees."""
     offsets, first_view, lights = place.offsets, place.first_view, place.lights
     steps = whole_steps(place.views)
     red, green, blue = record[RED], record[GREEN], record[BLUE]
@@ -87,19 +88,31 @@ def find_colors(place, record, material, lists):
         lists[CR + v] = red
         lists[CG + v] = green
         lists[CB + v] = blue
+    both = parts & SIDES != 0
+    if both:
+        i = np.uint64(number)
+        r, g, b = place.backs[i, 0], place.backs[i, 1], place.backs[i, 2]
+        for v in range(steps):
+            front = sees_front(offsets[first_view + v], record)
+            lists[CR + v] = red if front else r
+            lists[CG + v] = green if front else g
+            lists[CB + v] = blue if front else b
     specular, shininess = place.materials[material, 2], place.materials[material, 3]
     if specular == ZERO or not place.own_eye:
         return
     d = record[DEPTH]
     centre = (record[A] * d, record[B] * d, d)
-    normal = (record[NX], record[NY], record[ND])
     for k in range(lights.shape[0]):
-        light, faces = light_at(k, record, place.lens_offset, lights)
-        if not faces:
+        light, side = light_at(k, record, place.lens_offset, lights)
+        if side == ZERO or (side < ZERO and not both):
             continue
+        sign = ONE if side > ZERO else -ONE
+        normal = (sign * record[NX], sign * record[NY], sign * record[ND])
         red, green, blue = specular * lights[k, 4], specular * lights[k, 5], specular * lights[k, 6]
         for v in range(steps):
-            shine = shine_of(offsets[first_view + v], centre, normal, light, shininess)
+            offset = offsets[first_view + v]
+            shine = shine_of(offset, centre, normal, light, shininess)
+            shine = shine if not both or sees_front(offset, record) == (side > ZERO) else ZERO
             lists[CR + v] += shine * red
             lists[CG + v] += shine * green
             lists[CB + v] += shine * blue
@@ -226,7 +239,7 @@ def draw_chord(place, blending, row, surfel, chord, done, scratch):
 
     Returns which lists of the surfel are made.
     """
-    record, _, part, parts, material, lens = surfel
+    record, number, part, parts, material, lens = surfel
     planes, lists, ints, offsets = scratch.planes, scratch.lists, scratch.ints, place.offsets
     first_view, views = place.first_view, place.views
     small = TWO
@@ -244,7 +257,7 @@ def draw_chord(place, blending, row, surfel, chord, done, scratch):
     reach = record[REACH] * record[DEPTH]
     if drop_hidden(views, CLOSER * record[DEPTH] / max(chord[4], chord[5]) - reach, ints, planes):
         if not done & COLORS_MADE:
-            find_colors(place, record, material, lists)
+            find_colors(place, number, parts, record, material, lists)
             done |= COLORS_MADE
         add_weights(views, chord, reach, lists, ints, planes)
     return done
@@ -315,7 +328,8 @@ def splat_views(span, grid, splats, camera, offsets, scratch, color, depth):
             view, count = np.uint64(first), np.uint64(min(VIEWS_AT_ONCE, views - first))
             low, high, lens_offset = np.float32(columns[0]), np.float32(columns[1]), np.float32(camera.offset_y)
             materials, lights, own_eye = splats.materials, splats.lights, splats.own_eye
-            place = Place(offsets, view, count, low, high, np.int32(stride), lens_offset, materials, lights, own_eye)
+            lit = (splats.backs, materials, lights, own_eye)
+            place = Place(offsets, view, count, low, high, np.int32(stride), lens_offset, *lit)
             load_depths(rows, columns, count, stride, (height, width), view, depths, scratch.planes)
             for stage in range(BLEND):
                 draw_surfels(draw_chord, is_hidden, place, stage, bounds, splats, camera, scratch)

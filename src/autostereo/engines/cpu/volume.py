@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
 from ...scene.scene import Scene
 from ...scene.volume import Volume
 from ..engine import Camera, Draw
@@ -23,27 +22,25 @@ from .scene_arrays import light_array
 from .threads import run_rows
 from .volume_modes import LEVELS
 from .volume_panel import PIXEL_ROWS, draw_panel_rays, draw_panel_rows
+from .volume_plan import SLIDE, can_share, make_slices, share_slices, shared_reach
 from .volume_rays import BLOCK_ROWS, RAYS, ROW
 from .volume_sample import CHUNK, LIST, LIST_ROWS, SLABS, Cut, Planes, Slices
 from .volume_setup import (
     BLOCK,
     TABLE,
     Field,
-    depth_range,
     half_spaces,
     make_table,
     prepare_field,
     shown_blocks,
 )
-from .volume_shared import LINE, MAX_LENGTH, SLAB_ROWS, Shared
+from .volume_shared import LINE, SLAB_ROWS, Shared
 from .volume_views import ISO, MIP, Ways, draw_rows, draw_shared_rows
 
 MODES = ("composite", "mip", "iso")  # in the order of volume_views
 FINE = (1 / 8, 1 / 3)  # of a voxel: least and greatest distance of samples on a slice
 PER_PIXEL = 1.4  # distance of samples on a slice, in pixels of the nearest one
 FINE_VIEWS = (2, 8, 4)  # positions of a shared slab: least and most per pixel, and per voxel between them
-STEEPEST = 1.0  # greatest offset of a camera over the nearest depth, up to which views may share slabs
-MAX_PLANES = 2**20
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,16 +61,10 @@ def prepare_volumes(scene: Scene, volumes: list[Volume]) -> PreparedVolumes:
     return PreparedVolumes(scene, [prepare_field(volume, len(volumes) > 1) for volume in volumes])
 
 
-def make_slices(volumes: list[Volume], camera: Camera, step: float) -> Slices | None:
-    """Slices through all volumes (see reference.volume.planes); None when nothing lies behind the near plane."""
-    first, last = depth_range(volumes, camera)
-    if last <= first:
-        return None
-    count = (last - first) / (step * min(float(v.voxel_size.min()) for v in volumes))
-    if count > MAX_PLANES:
-        raise InputError(f"options step: {step:g} voxels make {count:.3g} slabs of the volumes, at most {MAX_PLANES}")
-    slabs = max(1, int(np.ceil(count)))
-    return Slices(first, (last - first) / slabs, slabs)
+def update_volumes(prepared: PreparedVolumes, scene: Scene, volumes: list[Volume]) -> PreparedVolumes:
+    """The same volumes under other transforms and transfer functions: scalars and gradients stay as they are."""
+    pairs = zip(prepared.fields, volumes, strict=True)
+    return PreparedVolumes(scene, [field._replace(volume=volume) for field, volume in pairs])
 
 
 def table_range(volume: Volume) -> tuple[float, float]:
@@ -85,6 +76,12 @@ def table_range(volume: Volume) -> tuple[float, float]:
     margin = 0.5 * float(points[-1] - points[0])  # for slabs that lead beyond an end
     first, last = max(low, float(points[0]) - margin), min(high, float(points[-1]) + margin)
     return (first, last) if first < last else (low, high)
+
+
+def gradient_turn(camera: Camera, volume: Volume) -> NDArray[np.float32]:
+    """Matrix (3, 3) that turns gradients from object to eye space, of about length 1."""
+    turn = camera.eye_from_world[:3, :3] @ np.linalg.inv(volume.transform[:3, :3]).T
+    return (turn / np.abs(turn).max()).astype(np.float32)
 
 
 def make_cut(
@@ -124,13 +121,14 @@ def make_cut(
         step,
         low,
         (TABLE - 1.0) / (high - low if high > low else 1.0),
-        np.ascontiguousarray(camera.eye_from_world[:3, :3], dtype=np.float32),
+        gradient_turn(camera, volume),
         lights,
         channels,
         light_colors,
         (1.0 - m.ambient) / max(m.diffuse, 1e-6),
         float(m.shininess),
         camera.offset_y,
+        volume.gradient == "sobel",
     )
     mode = MODES.index(volume.mode)
     colors, level = np.zeros((1, 4), np.float32), 0.0
@@ -193,24 +191,7 @@ def new_rays(counts: list[int], channels: list[int], slices: Slices) -> tuple[An
 def is_shared(prepared: PreparedVolumes, group: list[int], options: Options) -> bool:
     """Whether the slabs of a group are shared by all views: one volume that composes, if the options allow."""
     alone = len(group) == 1 and prepared.volumes[group[0]].mode == "composite"
-    return alone and (options.volume == "shared" or options.alpha == "averaged")
-
-
-def shared_reach(
-    camera: Camera, slices: Slices, offsets: NDArray[np.float64], fine: int, phases: int
-) -> tuple[float, int]:
-    """Where shared slabs begin, in pixels, and their positions of a phase, so that they reach as far as views see."""
-    ends = np.array([slices.first, slices.first + slices.slabs * slices.distance])
-    shifts = np.outer(offsets, camera.fx / camera.focal - camera.fx / ends)
-    begin = float(np.floor(-shifts.max())) - 2.0
-    positions = (camera.width - float(shifts.min()) + 2.0 - begin) * fine
-    return begin, -(-int(np.ceil(positions / phases) + 2) // RAYS) * RAYS
-
-
-def can_share(camera: Camera, slices: Slices, offsets: NDArray[np.float64]) -> bool:
-    """Whether slabs may be shared: not by cameras amid the volume, which see a slab from all sides."""
-    flat = float(np.abs(offsets).max()) <= STEEPEST * slices.first
-    return flat and shared_reach(camera, slices, offsets, 1, 1)[1] <= MAX_LENGTH
+    return alone and options.volume == "shared"
 
 
 def draw_volume_views(
@@ -234,19 +215,17 @@ def draw_volume_views(
     apart = wants_depth and not opaque and len(groups) > 1  # what is translucent ends no rays
     ends = depth.copy() if apart else depth
     for group in groups:
-        shared = may_share and is_shared(prepared, group, options)
-        made = [make_cut(prepared, index, draw, slices, shared, memory) for index in group]
+        if may_share and is_shared(prepared, group, options):
+            _draw_shared(prepared, group[0], draw, slices, color, memory)
+            continue
+        made = [make_cut(prepared, index, draw, slices, False, memory) for index in group]
         cuts, ways = tuple(cut for cut, _ in made), tuple(way for _, way in made)
         counts = [samples_of(prepared, index, camera, cut) for index, cut in zip(group, cuts, strict=True)]
-        if shared:
-            _draw_shared(cuts[0], ways[0], draw, slices, counts[0], color, memory)
-            continue
         channels = [way.light[0] for way in ways]
         pool = memory.pool(
             (("volume rays", *group), *counts, slices.slabs, *channels),
             partial(new_rays, counts, channels, slices),
         )
-
         nearest = ends.copy() if apart else depth
 
         def task(
@@ -269,10 +248,13 @@ def new_shared(camera: Camera, slices: Slices, offsets: NDArray[np.float64], fin
 
 
 def _draw_shared(
-    cut: Cut, ways: Ways, draw: Draw, slices: Slices, samples: int, color: NDArray[np.uint8], memory: Memory
+    prepared: PreparedVolumes, index: int, draw: Draw, slices: Slices, color: NDArray[np.uint8], memory: Memory
 ) -> None:
+    """Draw volume `index` from slabs that all views share, over color (V, H, W, 4)."""
     camera, offsets = draw.camera, draw.offsets
-    numbers = camera_numbers(camera)
+    numbers, slices = camera_numbers(camera), share_slices(slices, camera, offsets, SLIDE[0])
+    cut, ways = make_cut(prepared, index, draw, slices, True, memory)
+    samples = samples_of(prepared, index, camera, cut)
     pixel = slices.first / camera.fx * float(np.abs(cut.from_eye[:, 0]).max())  # of the nearest one, in voxels
     fine = int(np.clip(np.ceil(FINE_VIEWS[2] * pixel), FINE_VIEWS[0], FINE_VIEWS[1]))
     key = (
@@ -325,25 +307,28 @@ def draw_volume_panel(
     averaged = options.alpha == "averaged"
     numbers = camera_numbers(camera)
     may_share = depth.size == 0 and can_share(camera, slices, np.array([plan.low, plan.high]))
+    reach = np.array([plan.low, plan.high])
     for group in volume_groups(prepared, opaque):
         shared = may_share and is_shared(prepared, group, options)
-        made = [make_cut(prepared, index, draw, slices, shared, memory) for index in group]
+        own = share_slices(slices, camera, reach, SLIDE[1]) if shared else slices
+        made = [make_cut(prepared, index, draw, own, shared, memory) for index in group]
         cuts, ways = tuple(cut for cut, _ in made), tuple(way for _, way in made)
         counts = [samples_of(prepared, index, camera, cut) for index, cut in zip(group, cuts, strict=True)]
         channels = [way.light[0] for way in ways]
-        pool = _panel_pool(group, (counts, channels), draw, slices, plan if shared else None, memory)
+        pool = _panel_pool(group, (counts, channels), draw, own, plan if shared else None, memory)
 
         def task(
-            first: int, end: int, cuts: Any = cuts, ways: Any = ways, pool: Any = pool, shared: bool = shared
-        ) -> None:
+            first: int, end: int, cuts: Any = cuts, ways: Any = ways, pool: Any = pool, own: Slices | None = own,
+            shared: bool = shared,
+        ) -> None:  # fmt: skip
             with pool as (planes, slabs, scratch):
                 rows: Any = (first, end)
                 if shared:
-                    one = (rows, cuts[0], numbers, slices, ways[0])
+                    one = (rows, cuts[0], numbers, own, ways[0])
                     draw_panel_rows(*one, panel, averaged, planes[0], slabs, scratch, color)
                 else:
-                    all_of = (rows, cuts, numbers, slices, ways)
-                    draw_panel_rays(*all_of, panel, opaque and depth.size > 0, planes, scratch, color, depth)
+                    all_of = (rows, cuts, numbers, own, ways, panel, averaged, opaque and depth.size > 0)
+                    draw_panel_rays(*all_of, planes, scratch, color, depth)
 
         run_rows(camera.height, task)
 

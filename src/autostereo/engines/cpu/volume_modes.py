@@ -7,11 +7,9 @@ import numpy as np
 from .jit import inlined, kernel
 from .volume_rays import (
     BACK,
-    ENTER,
     FRONT,
     FRONT_LIGHT,
     HALF,
-    LEAVE,
     ONE,
     ORIGIN,
     SHARE,
@@ -22,56 +20,18 @@ from .volume_rays import (
     R,
     T,
     block_bounds,
+    index_at,
     sample_volume,
+    scalar_at,
     seen,
     share_of_slab,
+    slab_ends,
+    trim_ends,
 )
 
 LEVELS = 4096  # of the colours of mip
 REFINEMENTS = 24
 NONE = np.float32(-1.0)
-
-
-@inlined
-def scalar_at(cut, x, y, z):
-    """Scalar at index coordinates, as a row of the table."""
-    nx, ny, nz = cut.shape[0], cut.shape[1], cut.shape[2]
-    x, y, z = min(max(x, 0.0), nx - 1.0), min(max(y, 0.0), ny - 1.0), min(max(z, 0.0), nz - 1.0)
-    i, j, k = min(int(x), nx - 2), min(int(y), ny - 2), min(int(z), nz - 2)
-    u, v, w = x - i, y - j, z - k
-    s, p = cut.scalars, (k * ny + j) * nx + i
-    q = p + nx * ny
-    a = s[p] + u * (np.float64(s[p + 1]) - s[p])
-    b = s[p + nx] + u * (np.float64(s[p + nx + 1]) - s[p + nx])
-    c = s[q] + u * (np.float64(s[q + 1]) - s[q])
-    d = s[q + nx] + u * (np.float64(s[q + nx + 1]) - s[q + nx])
-    a, c = a + v * (b - a), c + v * (d - c)
-    return (a + w * (c - a) - cut.low) * cut.scale
-
-
-@inlined
-def index_at(cut, row, x, depth):
-    """Index coordinates of the point at X and depth of a row's plane."""
-    m, y = cut.from_eye, row[1] + depth * row[0]
-    return (
-        m[0, 0] * x + m[0, 1] * y + m[0, 2] * depth + m[0, 3],
-        m[1, 0] * x + m[1, 1] * y + m[1, 2] * depth + m[1, 3],
-        m[2, 0] * x + m[2, 1] * y + m[2, 2] * depth + m[2, 3],
-    )
-
-
-@inlined
-def scalar_on_ray(cut, row, ray, depth, rays):
-    """Scalar at a depth of one ray, as a row of the table."""
-    d = np.float64(depth)
-    x, y, z = index_at(cut, row, rays[ray + ORIGIN] + d * rays[ray + TURN], d)
-    return np.float32(scalar_at(cut, x, y, z))
-
-
-@inlined
-def slab_ends(ray, depth, distance, rays):
-    """Depths between which a ray is in a volume within the slab from `depth` on."""
-    return max(np.float32(depth), rays[ray + ENTER]), min(np.float32(depth + distance), rays[ray + LEAVE])
 
 
 @inlined
@@ -85,14 +45,7 @@ def sample_ends(n, base, k, fresh, cut, row, slices, planes, rays):
         sample_volume(n, base, depth, cut, row, False, planes, FRONT, FRONT_LIGHT, rays)
     sample_volume(n, base, depth + slices.distance, cut, row, False, planes, BACK, FRONT_LIGHT, rays)
     share_of_slab(n, base, depth, slices.distance, rays)
-    near, far = np.float32(depth), np.float32(depth + slices.distance)
-    for i in range(n):
-        if rays[base + SHARE + i] > ZERO:
-            enter, leave = rays[base + ENTER + i], rays[base + LEAVE + i]
-            if enter > near:
-                rays[base + FRONT + i] = scalar_on_ray(cut, row, base + i, enter, rays)
-            if leave < far:
-                rays[base + BACK + i] = scalar_on_ray(cut, row, base + i, leave, rays)
+    trim_ends(n, base, cut, row, depth, slices.distance, rays)
 
 
 @kernel
@@ -162,16 +115,42 @@ def march_iso(n, base, cut, row, slices, first, last, level, planes, rays):
 
 
 @inlined
+def scalar_along(cut, x, y, z, axis, i):
+    """Scalar at x, y, z, but for one coordinate."""
+    return scalar_at(cut, i if axis == 0 else x, i if axis == 1 else y, i if axis == 2 else z)
+
+
+@inlined
+def slope_along(cut, x, y, z, axis):
+    """Voxels' central differences along an axis, one-sided at the borders, interpolated."""
+    last = cut.shape[axis] - 1
+    at = min(max((x, y, z)[axis], 0.0), np.float64(last))
+    i = min(np.int64(at), last - 1)
+    a, b, c, d = max(i - 1, 0), i, i + 1, min(i + 2, last)
+    first = (scalar_along(cut, x, y, z, axis, c) - scalar_along(cut, x, y, z, axis, a)) / (c - a)
+    second = (scalar_along(cut, x, y, z, axis, d) - scalar_along(cut, x, y, z, axis, b)) / (d - b)
+    return first + (at - i) * (second - first)
+
+
+@inlined
 def slope_at(cut, x, y, z, axis):
-    """Central difference of the interpolated field along an index axis, one-sided at the borders."""
-    last = cut.shape[axis] - 1.0
-    at = (x, y, z)[axis]
-    low, high = max(at - 1.0, 0.0), min(at + 1.0, last)
-    if axis == 0:
-        return (scalar_at(cut, high, y, z) - scalar_at(cut, low, y, z)) / (high - low)
-    if axis == 1:
-        return (scalar_at(cut, x, high, z) - scalar_at(cut, x, low, z)) / (high - low)
-    return (scalar_at(cut, x, y, high) - scalar_at(cut, x, y, low)) / (high - low)
+    """Interpolated gradient of the voxels (volume_setup.gradient_at) along an index axis.
+
+    Smoothing by (¼, ½, ¼) and trilinear interpolation may change places.
+    """
+    if not cut.sobel:
+        return slope_along(cut, x, y, z, axis)
+    u, v, w = min(max(x, 0.0), cut.shape[0] - 1.0), min(max(y, 0.0), cut.shape[1] - 1.0), z
+    w = min(max(w, 0.0), cut.shape[2] - 1.0)
+    total = 0.0
+    for c in range(-1, 2):
+        for b in range(-1, 2):
+            weight = (2 - abs(b)) * (2 - abs(c)) / 16.0
+            p = u if axis == 0 else u + b
+            q = v if axis == 1 else (v + b if axis == 0 else v + c)
+            r = w if axis == 2 else w + c
+            total += weight * slope_along(cut, p, q, r, axis)
+    return total
 
 
 @inlined

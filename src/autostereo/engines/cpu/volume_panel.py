@@ -12,7 +12,7 @@ from .panel_lines import row_offsets
 from .volume_rays import END, HALF, LENGTH, ONE, ORIGIN, RAYS, ROW, TURN, ZERO, B, G, R, T
 from .volume_sample import SLABS, hide_runs, keep_alive, mark_runs
 from .volume_shared import ALPHA, LINE, SLAB_ROWS, classify_slabs, shift_of
-from .volume_views import HIDDEN, mark_volumes, next_slices, over, trace_rays
+from .volume_views import HIDDEN, PIXELS, mark_volumes, next_slices, over, trace_rays
 
 AT, MOVE, SHARE_R, CUT_R, A0, A1, C0, C1, SUM, THROUGH = (np.uint64(k * ROW) for k in range(10))
 PIXEL_ROWS = 10
@@ -175,25 +175,27 @@ def even_sub_pixel(x, offset, middle, camera, row, total, through):
 
 
 @kernel
-def draw_panel_rays(rows, cuts, camera, slices, ways, panel, wants_depth, planes, scratch, color, depth):
+def draw_panel_rays(rows, cuts, camera, slices, ways, panel, averaged, wants_depth, planes, scratch, color, depth):
     """Draw rows (first, end) of the picture, every sub-pixel along its own ray, over the panel color (H, W, 3).
 
-    cuts, ways, planes, depth (H, W, 3): see volume_views.draw_rows.
+    cuts, ways, planes, depth (H, W, 3): see volume_views.draw_rows. A block of rays is one channel of RAYS pixels or,
+    `averaged`, all three of fewer.
     """
     offsets, u, rays, index, _ = scratch
     height, width, _ = color.shape
     far = slices.first + slices.slabs * slices.distance
-    opaque = depth.shape[0] > 0
+    opaque, pixels = depth.shape[0] > 0, PIXELS if averaged else RAYS
     for r in range(rows[0], rows[1]):
         row = ((camera.centre_y - (r + 0.5)) / camera.fy - camera.offset_y / camera.focal, camera.offset_y)
         if mark_volumes(cuts, row, slices, planes) == 0:
             continue
         shown = height - 1 - r if panel.flip_y else r
         row_offsets(shown, width, panel.flip_x, (0, width), 0, 0, width, panel.plan, u, offsets)
-        for c in range(3):
-            for first in range(0, width, RAYS):
+        for block in range(1 if averaged else 3):
+            for first in range(0, width, pixels):
                 for i in range(RAYS):
-                    x, k = min(first + i, width - 1), np.uint64(i)
+                    c, p = (min(i // PIXELS, 2), i % PIXELS) if averaged else (block, i)
+                    x, k = min(first + p, width - 1), np.uint64(i)
                     o = np.float64(offsets[c * width + x])
                     at = x + place_in_pixel(panel.subpixel, c)
                     turn = (at + 0.5 - camera.centre_x) / camera.fx - o / camera.focal
@@ -204,9 +206,12 @@ def draw_panel_rays(rows, cuts, camera, slices, ways, panel, wants_depth, planes
                     if opaque:
                         column = width - 1 - x if panel.flip_x else x
                         rays[END + k] = min(np.float32(far), depth[shown, column, c])
-                trace_rays(cuts, row, slices, ways, wants_depth, planes, rays, index)
-                for i in range(min(RAYS, width - first)):
-                    x, k = first + i, np.uint64(i)
+                trace_rays(cuts, row, slices, ways, wants_depth, averaged, planes, rays, index)
+                for i in range(3 * PIXELS if averaged else RAYS):
+                    c, p = (i // PIXELS, i % PIXELS) if averaged else (block, i)
+                    x, k = first + p, np.uint64(i)
+                    if x >= width:
+                        continue
                     column = width - 1 - x if panel.flip_x else x
                     total = rays[k + R] if c == 0 else (rays[k + G] if c == 1 else rays[k + B])
                     color[shown, column, c] = over(total, rays[k + T], color[shown, column, c])

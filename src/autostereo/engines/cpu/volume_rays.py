@@ -1,7 +1,7 @@
 """Volumes along rays of their own: one view, or sub-pixels one by one (`volume="exact"`, n-pass, every isosurface).
 
 Rays are handled in blocks of 64, whose state lies in rows a fixed distance apart, so that every loop is SIMD (see
-mesh_shade). A slab is the stretch of a ray between two slices; its scalars at both ends are looked up in the table of
+scalars). A slab is the stretch of a ray between two slices; its scalars at both ends are looked up in the table of
 pre-integrated slabs (Engel, Kraus and Ertl 2001).
 """
 
@@ -10,16 +10,16 @@ from __future__ import annotations
 import numpy as np
 
 from .jit import inlined, kernel
-from .scalars import exp2_fast
-from .volume_sample import AT, EYE, LIGHT, LIST, VALUE, any_marked, on_slice, sample_points
+from .scalars import exp2_fast, log2_fast
+from .volume_sample import AT, EYE, LAST_ROW, LIGHT, LIST, TINY, VALUE, any_marked, on_slice, sample_points
 
 RAYS = 128  # of a block
 ROW = 144  # distance of a block's rows
 (
     ORIGIN, TURN, ENTER, LEAVE, LENGTH, T, R, G, B, HALF, FRONT, BACK, OPTICAL, SHARE,
-    PART, LEFT, RIGHT, END, FRONT_LIGHT, BACK_LIGHT,
-) = (np.uint64(k * ROW) for k in (*range(19), 24))  # fmt: skip
-BLOCK_ROWS = 30
+    PART, LEFT, RIGHT, END, FRONT_LIGHT, BACK_LIGHT, TOTAL, DONE, KEPT,
+) = (np.uint64(k * ROW) for k in (*range(19), 24, 30, 31, 32))  # fmt: skip
+BLOCK_ROWS = 33
 ZERO, ONE, HALF_WAY = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 TEN_BITS, COLOR_STEP = np.int32(1023), np.float32(1.0 / 1023.0)
 OPAQUE = 128  # transmittance in 65536ths, below which a ray has seen enough
@@ -114,6 +114,66 @@ def share_of_slab(n, base, depth, distance, rays):
 
 
 @inlined
+def scalar_at(cut, x, y, z):
+    """Scalar at index coordinates, as a row of the table."""
+    nx, ny, nz = cut.shape[0], cut.shape[1], cut.shape[2]
+    x, y, z = min(max(x, 0.0), nx - 1.0), min(max(y, 0.0), ny - 1.0), min(max(z, 0.0), nz - 1.0)
+    i, j, k = min(int(x), nx - 2), min(int(y), ny - 2), min(int(z), nz - 2)
+    u, v, w = x - i, y - j, z - k
+    s, p = cut.scalars, (k * ny + j) * nx + i
+    q = p + nx * ny
+    a = s[p] + u * (np.float64(s[p + 1]) - s[p])
+    b = s[p + nx] + u * (np.float64(s[p + nx + 1]) - s[p + nx])
+    c = s[q] + u * (np.float64(s[q + 1]) - s[q])
+    d = s[q + nx] + u * (np.float64(s[q + nx + 1]) - s[q + nx])
+    a, c = a + v * (b - a), c + v * (d - c)
+    return (a + w * (c - a) - cut.low) * cut.scale
+
+
+@inlined
+def index_at(cut, row, x, depth):
+    """Index coordinates of the point at X and depth of a row's plane."""
+    m, y = cut.from_eye, row[1] + depth * row[0]
+    return (
+        m[0, 0] * x + m[0, 1] * y + m[0, 2] * depth + m[0, 3],
+        m[1, 0] * x + m[1, 1] * y + m[1, 2] * depth + m[1, 3],
+        m[2, 0] * x + m[2, 1] * y + m[2, 2] * depth + m[2, 3],
+    )
+
+
+@inlined
+def scalar_on_ray(cut, row, ray, depth, rays):
+    """Scalar at a depth of one ray, as a row of the table."""
+    d = np.float64(depth)
+    x, y, z = index_at(cut, row, rays[ray + ORIGIN] + d * rays[ray + TURN], d)
+    return min(max(np.float32(scalar_at(cut, x, y, z)), ZERO), LAST_ROW)
+
+
+@inlined
+def slab_ends(ray, depth, distance, rays):
+    """Depths between which a ray is in a volume within the slab from `depth` on."""
+    return max(np.float32(depth), rays[ray + ENTER]), min(np.float32(depth + distance), rays[ray + LEAVE])
+
+
+@inlined
+def trim_ends(n, base, cut, row, depth, distance, rays):
+    """Scalars where rays enter or leave within a slab, instead of those of its slices."""
+    near, far, some = np.float32(depth), np.float32(depth + distance), np.int32(0)
+    for i in range(n):
+        ends = (rays[base + ENTER + i] > near) | (rays[base + LEAVE + i] < far)
+        some |= np.int32(ends & (rays[base + SHARE + i] > ZERO))
+    if some == 0:
+        return
+    for i in range(n):
+        if rays[base + SHARE + i] > ZERO:
+            enter, leave = rays[base + ENTER + i], rays[base + LEAVE + i]
+            if enter > near:
+                rays[base + FRONT + i] = scalar_on_ray(cut, row, base + i, enter, rays)
+            if leave < far:
+                rays[base + BACK + i] = scalar_on_ray(cut, row, base + i, leave, rays)
+
+
+@inlined
 def classify(n, base, extinction, color, rays, packed):
     """Optical depth of a slab of nominal length, and its packed colour, from the scalars at its two ends."""
     for i in range(n):
@@ -170,12 +230,13 @@ def blend(n, base, material, light, rays, packed):
 
 @inlined
 def find_half(n, base, depth, distance, rays):
-    """Note where opacity reaches ½ within a slab: T before the slab is in OPTICAL."""
+    """Note where opacity reaches ½, optical depth growing evenly within a slab: T before it is in OPTICAL."""
     near, far = np.float32(depth), np.float32(depth + distance)
     for i in range(n):
         before, after = rays[base + OPTICAL + i], rays[base + T + i]
         enter, leave = max(near, rays[base + ENTER + i]), min(far, rays[base + LEAVE + i])
-        part = (before - HALF_WAY) / max(before - after, np.float32(1e-9))
+        left = log2_fast(max(before, TINY))
+        part = (left + ONE) / max(left - log2_fast(max(after, TINY)), np.float32(1e-9))
         if (before > HALF_WAY) & (after <= HALF_WAY):
             rays[base + HALF + i] = enter + part * (leave - enter)
 
@@ -201,9 +262,47 @@ def seen(bounds, depth, cut, marks, k):
     return any_marked(marks, k, np.int64(first), np.int64(last) + 1)
 
 
+@inlined
+def is_seen(n, base, cut, slices, k, planes, rays):
+    """Whether a block of rays may meet something in slab k of a volume."""
+    bounds, depth = block_bounds(n, base, rays), slices.first + k * slices.distance
+    return seen(bounds, depth, cut, planes.marks, k) or seen(
+        bounds, depth + slices.distance, cut, planes.marks, k + 1
+    )
+
+
 @kernel
-def march(n, base, cut, row, slices, first, last, way, wants_half, planes, rays, packed):
-    """Take a block of rays through slabs first … last; way: see volume_views.Ways."""
+def add_optical(n, base, cut, row, slices, k, way, planes, rays, packed):
+    """Add the optical depth of slab k of one of several volumes to TOTAL."""
+    depth = slices.first + k * slices.distance
+    sample_volume(n, base, depth, cut, row, False, planes, FRONT, FRONT_LIGHT, rays)
+    sample_volume(n, base, depth + slices.distance, cut, row, False, planes, BACK, FRONT_LIGHT, rays)
+    share_of_slab(n, base, depth, slices.distance, rays)
+    trim_ends(n, base, cut, row, depth, slices.distance, rays)
+    classify(n, base, way.table.extinction, way.table.color, rays, packed)
+    for i in range(n):
+        rays[base + TOTAL + i] += rays[base + OPTICAL + i] * rays[base + SHARE + i] * rays[base + LENGTH + i]
+
+
+@inlined
+def part_of_total(n, base, rays):
+    """Opacity (SHARE) that makes a volume's part of a slab that it shares with others; SHARE holds its optical depth.
+
+    All volumes together have opacity 1 − 2^−TOTAL, each its part by optical depth; the sum of the parts so far is DONE.
+    """
+    for i in range(n):
+        total = rays[base + TOTAL + i]
+        part = (ONE - exp2_fast(-total)) * rays[base + SHARE + i] / max(total, TINY)
+        rays[base + SHARE + i] = min(part / max(ONE - rays[base + DONE + i], TINY), ONE)
+        rays[base + DONE + i] += part
+
+
+@kernel
+def march(n, base, cut, row, slices, first, last, way, wants_half, among, planes, rays, packed):
+    """Take a block of rays through slabs first … last; way: see volume_views.Ways.
+
+    among: other volumes share the slab, TOTAL is their optical depth together.
+    """
     fresh = False
     material = (np.float32(way.material[0]), np.float32(way.material[1]), np.float32(way.material[2]))
     bounds = block_bounds(n, base, rays)
@@ -222,10 +321,15 @@ def march(n, base, cut, row, slices, first, last, way, wants_half, planes, rays,
             sample_volume(n, base, depth, cut, row, way.own_eyes, planes, FRONT, FRONT_LIGHT, rays)
         sample_volume(n, base, after, cut, row, way.own_eyes, planes, BACK, BACK_LIGHT, rays)
         share_of_slab(n, base, depth, slices.distance, rays)
+        trim_ends(n, base, cut, row, depth, slices.distance, rays)
         classify(n, base, way.table.extinction, way.table.color, rays, packed)
         for i in range(n):
-            optical = rays[base + OPTICAL + i] * rays[base + SHARE + i] * rays[base + LENGTH + i]
-            rays[base + SHARE + i] = ONE - exp2_fast(-optical)
+            rays[base + SHARE + i] *= rays[base + OPTICAL + i] * rays[base + LENGTH + i]
+        if among:
+            part_of_total(n, base, rays)
+        else:
+            for i in range(n):
+                rays[base + SHARE + i] = ONE - exp2_fast(-rays[base + SHARE + i])
         if wants_half:
             for i in range(n):
                 rays[base + OPTICAL + i] = rays[base + T + i]

@@ -30,13 +30,12 @@ ZERO, ONE, TINY = np.float32(0.0), np.float32(1.0), np.float32(1e-20)
 class Cut(NamedTuple):
     """How a volume is cut by the slices.
 
-    scalars, words, shape: see volume_setup; from_eye (3, 4) float64: index coordinates of
-    (X, Y, depth, 1); halves
-    (K, 4): half-spaces in index space; shown: blocks; first, step: X of the first sample and from sample to sample;
-    low, scale: what makes a scalar a row of the table; rotation (3, 3) float32: eye_from_world; lights: see
-    scene_arrays.light_array; channels of light that samples get, and colours among them: diffuse, one or for each
+    scalars, words, shape: see volume_setup; from_eye (3, 4) float64: index coordinates of (X, Y, depth, 1); halves (K,
+    4): half-spaces in index space; shown: blocks; first, step: X of the first sample and from sample to sample; low,
+    scale: what makes a scalar a row of the table; turn (3, 3) float32: of gradients, from object to eye space; lights:
+    see scene_arrays.light_array; channels of light that samples get, and colours among them: diffuse, one or for each
     colour one, then as many for the highlight if there is one; neutral: diffuse light that leaves a colour as it is;
-    shininess; lens: Y of the eyes.
+    shininess; lens: Y of the eyes; sobel: how gradients of isosurfaces are smoothed, see volume_setup.gradient_at.
     """
 
     scalars: np.ndarray
@@ -49,13 +48,14 @@ class Cut(NamedTuple):
     step: float
     low: float
     scale: float
-    rotation: np.ndarray
+    turn: np.ndarray
     lights: np.ndarray
     channels: int
     colors: int
     neutral: float
     shininess: float
     lens: float
+    sobel: bool
 
 
 class Slices(NamedTuple):
@@ -172,21 +172,22 @@ def trilinear(u, v, w, a, b, c, d, e, f, g, h):
 
 
 @inlined
-def byte_of(word, shift):
-    """A byte of a word, turned at 128. (Masked, so that SIMD stays in 32 bits.)"""
-    return np.float32(np.int32((word >> shift) & np.int32(255)))
+def part_of(word, shift, mask):
+    """Some bits of a word. (Masked, so that SIMD stays in 32 bits.)"""
+    return np.float32(np.int32((word >> shift) & mask))
 
 
 @inlined
-def interpolate_bytes(n, shift, row, words, lists):
-    """Trilinear interpolation of a byte with sign of the words that were brought, into a row of lists."""
+def interpolate_parts(n, shift, mask, row, words, lists):
+    """Trilinear interpolation of some bits, with sign, of the words that were brought, into a row of lists."""
+    middle = np.float32((mask + np.int32(1)) >> np.int32(1))
     for i in range(n):
-        a, b = byte_of(words[W0 + i], shift), byte_of(words[W1 + i], shift)
-        c, d = byte_of(words[W2 + i], shift), byte_of(words[W3 + i], shift)
-        e, f = byte_of(words[W4 + i], shift), byte_of(words[W5 + i], shift)
-        g, h = byte_of(words[W6 + i], shift), byte_of(words[W7 + i], shift)
+        a, b = part_of(words[W0 + i], shift, mask), part_of(words[W1 + i], shift, mask)
+        c, d = part_of(words[W2 + i], shift, mask), part_of(words[W3 + i], shift, mask)
+        e, f = part_of(words[W4 + i], shift, mask), part_of(words[W5 + i], shift, mask)
+        g, h = part_of(words[W6 + i], shift, mask), part_of(words[W7 + i], shift, mask)
         value = trilinear(lists[PX + i], lists[PY + i], lists[PZ + i], a, b, c, d, e, f, g, h)
-        lists[row + i] = value - np.float32(128.0)
+        lists[row + i] = value - middle
 
 
 @inlined
@@ -202,11 +203,11 @@ def interpolate_words(n, row, words, lists):
 
 @inlined
 def light_samples(n, cut, y, depth, lists):
-    """Light on n samples at X = AT, of which lists hold the gradients in world space, into LIGHT and on.
+    """Light on n samples at X = AT, of which lists hold the gradients in object space, into LIGHT and on.
 
     Both sides of a normal are lit alike: |N·L|, |N·H|; EYE: X of the eye that highlights are for.
     """
-    m, row = cut.rotation, np.uint64(LIST)
+    m, row = cut.turn, np.uint64(LIST)
     py, pz = np.float32(y), np.float32(depth)
     for i in range(n):
         a, b, c = lists[NX + i], lists[NY + i], lists[NZ + i]
@@ -273,11 +274,12 @@ def sample_points(n, cut, y, depth, start, place, words, lists):
         interpolate_words(n, VALUE, words, lists)
     if cut.channels > 0:
         bring(n, cut.words, cut.shape, place, words)
-        interpolate_bytes(n, np.int32(0), NX, words, lists)
-        interpolate_bytes(n, np.int32(8), NY, words, lists)
-        interpolate_bytes(n, np.int32(16), NZ, words, lists)
+        bits, mask = (np.int32(8), np.int32(255)) if cut.scalars.itemsize == 1 else (np.int32(10), np.int32(1023))
+        interpolate_parts(n, np.int32(0), mask, NX, words, lists)
+        interpolate_parts(n, bits, mask, NY, words, lists)
+        interpolate_parts(n, bits + bits, mask, NZ, words, lists)
     if together:
-        interpolate_bytes(n, np.int32(24), VALUE, words, lists)
+        interpolate_parts(n, np.int32(24), np.int32(255), VALUE, words, lists)
         low -= np.float32(128.0)
     for i in range(n):
         lists[VALUE + i] = min(max((lists[VALUE + i] - low) * scale, ZERO), LAST_ROW)

@@ -1,7 +1,8 @@
 """Volumes before they are drawn: scalars, quantised gradients, blocks that show something, classification.
 
-Once per scene: scalars of 8 or 16 bits (others are scaled to 16), gradients of three bytes, the range of scalars in
-every block of 4³ voxels. Once per transfer function: which blocks show anything, and the table of pre-integrated slabs.
+Once per scene: scalars of 8 or 16 bits (others are scaled to 16), gradients of three bytes or, beside 16 bits, of three
+times 10 bits, the range of scalars in every block of 4³ voxels. Once per transfer function: which blocks show anything,
+and the table of pre-integrated slabs.
 """
 
 from __future__ import annotations
@@ -15,19 +16,20 @@ from ...scene.transfer import TransferFunction
 from ...scene.volume import Volume
 from ...transforms import apply
 from ..engine import Camera
-from .jit import kernel
+from .jit import inlined, kernel
 from .threads import run_rows
 
 BLOCK = 2  # log2 of the edge of a block, in voxels
 TABLE = 256  # scalars of the pre-integration table
+SOUNDINGS = 65_521  # voxels whose gradients are measured, to know how steep they are
+STEEP = 99.9  # percentile of those that differ from zero: steeper gradients keep their direction only
 
 
 class Grid(NamedTuple):
     """One volume as the kernels read it.
 
-    scalars (nz·ny·nx,) uint8 or uint16; words (nz·ny·nx,) int32: three bytes of gradient, see store_gradients, and
-    above them the scalar if it is one byte, or (0,) without shading; shape (3,) int64: nx, ny, nz; low, high: stored
-    scalars of the first and the last row of the table.
+    scalars (nz·ny·nx,) uint8 or uint16; words (nz·ny·nx,) int32: gradients, see store_gradients, or (0,) without
+    shading; shape (3,) int64: nx, ny, nz; low, high: stored scalars of the first and the last row of the table.
     """
 
     scalars: NDArray[Any]
@@ -68,47 +70,88 @@ def block_ranges(scalars, shape, first, last, ranges):
                 ranges[1, bz, by, bx] = most
 
 
-@kernel
-def store_gradients(scalars, shape, sobel, matrix, steepest, first, last, words):
-    """Quantise the gradients (world space) of voxel layers first … last: 127 is `steepest`.
+@inlined
+def gradient_at(scalars, shape, sobel, x, y, z):
+    """Gradient ∂s/∂(i, j, k) at a voxel: central differences, one-sided at the borders.
 
-    Slight gradients keep a direction, with at least one step. They are central differences, one-sided at the borders,
-    for `sobel` smoothed by (¼, ½, ¼) along both other axes; matrix (3, 3): ∂(i, j, k)/∂world.
+    For `sobel` each is smoothed by (¼, ½, ¼) along both other axes, border voxels repeated.
     """
     nx, ny, nz = shape[0], shape[1], shape[2]
     reach = 1 if sobel else 0
+    g0, g1, g2 = 0.0, 0.0, 0.0
+    for c in range(-reach, reach + 1):
+        for b in range(-reach, reach + 1):
+            weight = (2 - abs(b)) * (2 - abs(c)) / 16.0 if sobel else 1.0
+            xb, yb = min(max(x + b, 0), nx - 1), min(max(y + b, 0), ny - 1)
+            yc, zc = min(max(y + c, 0), ny - 1), min(max(z + c, 0), nz - 1)
+            a, e = max(x - 1, 0), min(x + 1, nx - 1)
+            k = (zc * ny + yb) * nx
+            g0 += weight * (np.float64(scalars[k + e]) - np.float64(scalars[k + a])) / (e - a)
+            a, e = max(y - 1, 0), min(y + 1, ny - 1)
+            k = zc * ny * nx + xb
+            g1 += weight * (np.float64(scalars[k + e * nx]) - np.float64(scalars[k + a * nx])) / (e - a)
+            a, e = max(z - 1, 0), min(z + 1, nz - 1)
+            k = yc * nx + xb
+            below, above = np.float64(scalars[k + a * ny * nx]), np.float64(scalars[k + e * ny * nx])
+            g2 += weight * (above - below) / (e - a)
+    return g0, g1, g2
+
+
+@inlined
+def turned(matrix, g):
+    """A gradient over (i, j, k) in object space; matrix (3, 3): ∂(i, j, k)/∂(x, y, z)."""
+    return (
+        matrix[0, 0] * g[0] + matrix[1, 0] * g[1] + matrix[2, 0] * g[2],
+        matrix[0, 1] * g[0] + matrix[1, 1] * g[1] + matrix[2, 1] * g[2],
+        matrix[0, 2] * g[0] + matrix[1, 2] * g[1] + matrix[2, 2] * g[2],
+    )
+
+
+@kernel
+def measure_gradients(scalars, shape, sobel, matrix, every, lengths):
+    """Fill lengths (N,) float64 with those of the gradients, in object space, of every so many-th voxel."""
+    nx, ny = shape[0], shape[1]
+    for i in range(lengths.shape[0]):
+        k = i * every
+        a, b, c = turned(matrix, gradient_at(scalars, shape, sobel, k % nx, k // nx % ny, k // (nx * ny)))
+        lengths[i] = np.sqrt(a * a + b * b + c * c)
+
+
+@kernel
+def store_gradients(scalars, shape, sobel, matrix, steepest, first, last, words):
+    """Quantise the gradients (object space, so that transforms do not matter) of voxel layers first … last.
+
+    A word holds three numbers with sign, turned at half of what they can be: of 8 bits, 127 being `steepest`, and the
+    scalar above them; or, where that has 16 bits and is read on its own, of 10 bits, 511 being `steepest`. Slight
+    gradients keep a direction, with at least one step.
+    """
+    nx, ny = shape[0], shape[1]
+    narrow = scalars.itemsize == 1
+    bits, middle = (8, 128) if narrow else (10, 512)
     for z in range(first, last):
         for y in range(ny):
             for x in range(nx):
-                g0, g1, g2 = 0.0, 0.0, 0.0
-                for c in range(-reach, reach + 1):
-                    for b in range(-reach, reach + 1):
-                        weight = (2 - abs(b)) * (2 - abs(c)) / 16.0 if sobel else 1.0
-                        xb, yb = min(max(x + b, 0), nx - 1), min(max(y + b, 0), ny - 1)
-                        yc, zc = min(max(y + c, 0), ny - 1), min(max(z + c, 0), nz - 1)
-                        a, e = max(x - 1, 0), min(x + 1, nx - 1)
-                        k = (zc * ny + yb) * nx
-                        g0 += weight * (np.float64(scalars[k + e]) - np.float64(scalars[k + a])) / (e - a)
-                        a, e = max(y - 1, 0), min(y + 1, ny - 1)
-                        k = zc * ny * nx + xb
-                        g1 += weight * (np.float64(scalars[k + e * nx]) - np.float64(scalars[k + a * nx])) / (e - a)
-                        a, e = max(z - 1, 0), min(z + 1, nz - 1)
-                        k = yc * nx + xb
-                        below, above = np.float64(scalars[k + a * ny * nx]), np.float64(scalars[k + e * ny * nx])
-                        g2 += weight * (above - below) / (e - a)
-                a = matrix[0, 0] * g0 + matrix[1, 0] * g1 + matrix[2, 0] * g2
-                b = matrix[0, 1] * g0 + matrix[1, 1] * g1 + matrix[2, 1] * g2
-                c = matrix[0, 2] * g0 + matrix[1, 2] * g1 + matrix[2, 2] * g2
+                a, b, c = turned(matrix, gradient_at(scalars, shape, sobel, x, y, z))
                 length = np.sqrt(a * a + b * b + c * c)
                 scale = 0.0
                 if length > 0.0:
                     most = max(abs(a), abs(b), abs(c))
-                    scale = max(127.0 * min(length / steepest, 1.0) / length, 1.0 / most)
+                    scale = max((middle - 1) * min(length / steepest, 1.0) / length, 1.0 / most)
                 k = (z * ny + y) * nx + x
-                p = np.int64(np.floor(a * scale + 0.5)) + 128  # bytes with sign are turned at 128
-                q = np.int64(np.floor(b * scale + 0.5)) + 128
-                r = np.int64(np.floor(c * scale + 0.5)) + 128
-                words[k] = np.int32(((np.int64(scalars[k]) & 255) << 24) | (r << 16) | (q << 8) | p)
+                p = np.int64(np.floor(a * scale + 0.5)) + middle
+                q = np.int64(np.floor(b * scale + 0.5)) + middle
+                r = np.int64(np.floor(c * scale + 0.5)) + middle
+                above = (np.int64(scalars[k]) & 255) << 24 if narrow else 0
+                words[k] = np.int32(above | (r << (2 * bits)) | (q << bits) | p)
+
+
+def steepest_gradient(scalars: NDArray[Any], volume: Volume, matrix: NDArray[np.float64]) -> float:
+    """Length in object space, in stored scalars, of all but the few steepest gradients of a volume."""
+    every = max(1, scalars.size // SOUNDINGS) | 1  # odd, so that it does not stay in few columns of voxels
+    lengths = np.empty(-(-scalars.size // every))
+    measure_gradients(scalars, np.array(volume.shape, np.int64), volume.gradient == "sobel", matrix, every, lengths)
+    lengths = lengths[lengths > 0]
+    return float(np.percentile(lengths, STEEP)) if len(lengths) else 1.0 / min(volume.spacing)
 
 
 def prepare_field(volume: Volume, wide: bool) -> Field:
@@ -138,8 +181,8 @@ def prepare_field(volume: Volume, wide: bool) -> Field:
     words = np.zeros(0, np.int32)
     if volume.shade and volume.mode == "composite":
         words = np.empty(values.size, np.int32)
-        matrix = np.linalg.inv(volume.world_from_index)[:3, :3].astype(np.float64)
-        steepest = max(high - low, 1e-300) / value_step / 2 / float(volume.voxel_size.min())
+        matrix = np.linalg.inv(volume.object_from_index)[:3, :3].astype(np.float64)
+        steepest = steepest_gradient(scalars, volume, matrix)
         args = (scalars, shape, volume.gradient == "sobel", matrix, steepest)
         run_rows(volume.values.shape[0], lambda first, last: store_gradients(*args, first, last, words), 2)
     grid = Grid(scalars, words, shape, (low - first_value) / value_step, (high - first_value) / value_step)

@@ -43,6 +43,7 @@ from .volume_rays import (
     sample_grid,
     seen,
     share_of_slab,
+    trim_ends,
 )
 
 MAX_LENGTH = 16384  # positions of a phase
@@ -120,6 +121,7 @@ def classify_slabs(cut, camera, row, slices, first, last, table, material, light
                 values = planes.values[k - first + 1]
                 sample_grid(n, base, depth + slices.distance, cut, values, BACK, BACK_LIGHT, rays, packed)
                 share_of_slab(n, base, depth, slices.distance, rays)
+                trim_ends(n, base, cut, row, depth, slices.distance, rays)
                 classify(n, base, table.extinction, table.color, rays, packed)
                 for i in range(n):
                     optical = rays[base + OPTICAL + i] * rays[base + SHARE + i] * rays[base + LENGTH + i]

@@ -9,27 +9,34 @@ import numpy as np
 from .jit import inlined, kernel
 from .volume_modes import NONE, march_iso, march_mip, resolve_iso, resolve_mip
 from .volume_rays import (
+    DONE,
     END,
     HALF,
     HALF_WAY,
+    KEPT,
     LENGTH,
     ONE,
     OPAQUE,
     ORIGIN,
     RAYS,
+    TOTAL,
     TURN,
     ZERO,
     B,
     G,
     R,
     T,
+    add_optical,
+    is_seen,
     march,
     ray_stretch,
-)  # fmt: skip
-from .volume_sample import SLABS, hide_runs, keep_alive, mark_runs, sample_slice
+)
+from .volume_sample import SLABS, TINY, hide_runs, keep_alive, mark_runs, sample_slice
 from .volume_shared import ALPHA, BLUE, GREEN, LINE, RED, SLAB_ROWS, blend_view, classify_slabs, clear_line, even_out
 
 COMPOSITE, MIP, ISO = 0, 1, 2
+PIXELS = RAYS // 3  # of a block of sub-pixels that are averaged
+THIRD = np.float32(1.0 / 3.0)
 HIDDEN = np.float32(OPAQUE / 65536.0)
 BYTE = np.float32(255.0)
 
@@ -52,11 +59,43 @@ class Ways(NamedTuple):
     own_eyes: bool
 
 
+@inlined
+def add_totals(n, base, cuts, row, slices, ways, k, planes, rays, packed):
+    """Optical depth of slab k of all volumes into TOTAL; returns whether several are seen there."""
+    together = 0
+    for v in range(len(cuts)):
+        together += is_seen(n, base, cuts[v], slices, k, planes[v], rays)
+    if together < 2:
+        return False
+    for i in range(n):
+        rays[base + TOTAL + i] = ZERO
+        rays[base + DONE + i] = ZERO
+    for v in range(len(cuts)):
+        if is_seen(n, base, cuts[v], slices, k, planes[v], rays):
+            ray_stretch(n, base, cuts[v], row, slices.first, rays)
+            add_optical(n, base, cuts[v], row, slices, k, ways[v], planes[v], rays, packed)
+    return True
+
+
+@inlined
+def average_alphas(pixels, base, rays):
+    """Attenuate the rays of a pixel's three sub-pixels, `pixels` apart, by their mean; KEPT: T before the slab."""
+    for i in range(pixels):
+        let = ZERO
+        for c in range(3):
+            ray = base + i + np.uint64(c) * pixels
+            let += rays[ray + T] / max(rays[ray + KEPT], TINY)
+        for c in range(3):
+            ray = base + i + np.uint64(c) * pixels
+            rays[ray + T] = rays[ray + KEPT] * let * THIRD
+
+
 @kernel
-def trace_rays(cuts, row, slices, ways, wants_half, planes, rays, packed):
+def trace_rays(cuts, row, slices, ways, wants_half, averaged, planes, rays, packed):
     """Take a block of rays, of which ORIGIN, TURN, LENGTH and END are set, through volumes: colours, T and HALF.
 
-    Several volumes take turns slab by slab.
+    Several volumes take turns slab by slab. averaged: the block is of PIXELS pixels, one channel after the other,
+    that are attenuated by the mean alpha of the three.
     """
     n, base, mode = np.uint64(RAYS), np.uint64(0), ways[0].mode
     for i in range(n):
@@ -65,9 +104,15 @@ def trace_rays(cuts, row, slices, ways, wants_half, planes, rays, packed):
         rays[G + i] = ZERO
         rays[B + i] = ZERO
         rays[HALF + i] = np.float32(np.inf)
-    step = slices.slabs if len(cuts) == 1 else 1
+    averaged = averaged and mode == COMPOSITE
+    step = slices.slabs if len(cuts) == 1 and not averaged else 1
     for k in range(0, slices.slabs, step):
-        last = min(k + step, slices.slabs)
+        last, among = min(k + step, slices.slabs), False
+        if averaged:
+            for i in range(n):
+                rays[KEPT + i] = rays[T + i]
+        if len(cuts) > 1 and mode == COMPOSITE:
+            among = add_totals(n, base, cuts, row, slices, ways, k, planes, rays, packed)
         for v in range(len(cuts)):
             cut, way = cuts[v], ways[v]
             ray_stretch(n, base, cut, row, slices.first, rays)
@@ -76,7 +121,9 @@ def trace_rays(cuts, row, slices, ways, wants_half, planes, rays, packed):
             elif mode == ISO:
                 march_iso(n, base, cut, row, slices, k, last, way.level, planes[v], rays)
             else:
-                march(n, base, cut, row, slices, k, last, way, wants_half, planes[v], rays, packed)
+                march(n, base, cut, row, slices, k, last, way, wants_half, among, planes[v], rays, packed)
+        if averaged:
+            average_alphas(np.uint64(PIXELS), base, rays)
     way = ways[0]
     if mode == MIP:
         resolve_mip(n, base, way.colors, rays)
@@ -157,7 +204,7 @@ def draw_rows(rows, cuts, camera, slices, ways, offsets, wants_depth, planes, ra
                 if opaque:
                     for i in range(np.uint64(end - x)):
                         rays[END + i] = min(np.float32(far), depth[v, r, x + i])
-                trace_rays(cuts, row, slices, ways, wants_depth, planes, rays, packed)
+                trace_rays(cuts, row, slices, ways, wants_depth, False, planes, rays, packed)
                 finish_rays(np.uint64(end - x), base, rays, color[v, r, x:end])
                 if wants_depth:
                     for i in range(np.uint64(end - x)):

@@ -54,6 +54,10 @@ class ReferenceEngine:
             made[type(item)].append(PREPARE[type(item)](item))
         return PreparedScene(made[Mesh], made[Points], made[Volume], scene.lights, np.array(scene.background))
 
+    def update(self, prepared: PreparedScene, scene: Scene) -> PreparedScene:
+        """Prepare the scene anew: nothing here is dear."""
+        return self.prepare(scene)
+
     def draw(self, prepared: PreparedScene, draw: Draw, target: Target) -> None:
         """Fill `target`: view by view, or the panel's sub-pixels."""
         if draw.viewmap is not None:

@@ -6,8 +6,8 @@ The nearest d_s of all surfels at a sample is its depth z; all surfels with d_s 
 blended to Σ w·c / Σ w: ε-z visibility and normalised blending (Hübner 2007b, section 3.5.2; Pfister et al. 2000).
 
 Discs without a normal lie in the plane of constant depth. So do, for a view in which its projection is less than a
-pixel wide, discs with one: they become ellipses on the picture with half axes of at least `LEAST_RADIUS` pixels, so
-that samples, which are a pixel apart, do not miss them.
+pixel wide, discs with one. Both are ellipses on the picture, with half axes of at least `LEAST_RADIUS` pixels, so that
+samples, which are a pixel apart, do not miss them.
 """
 
 from __future__ import annotations
@@ -140,9 +140,8 @@ def intersect(surfels: Surfels, camera: Camera, x: Array, y: Array, v: Array) ->
     away = depth[:, None] * rays.direction - centre
     distance = np.sum((away / radii[:, None]) ** 2, axis=1)
 
-    least = np.where(thin, LEAST_RADIUS, 0.0)
     on_picture = (rays.direction - centre / d[:, None])[:, :2] * (camera.fx, camera.fy)
-    half_axes = np.maximum(np.outer(radii / d, [camera.fx, camera.fy]), least[:, None])
+    half_axes = np.maximum(np.outer(radii / d, [camera.fx, camera.fy]), LEAST_RADIUS)
     distance = np.where(upright, np.sum((on_picture / half_axes) ** 2, axis=1), distance)
     depth = np.where(upright, d, depth)
     return depth, np.where(meets & (depth >= camera.near), 1.0 - distance, 0.0)
@@ -198,14 +197,14 @@ def shade_surfels(
 ) -> Array:
     """Colours (N, 3) of surfels in eye space, lit at their centres for eyes at offsets (N,); not clamped.
 
-    Surfels have two sides: the normal is turned to the centre camera, the same for all views.
+    Surfels have two sides: the normal is turned to the eye that they are lit for.
     """
     centre = np.array([0.0, camera.offset_y, 0.0])
     eyes = np.tile(centre, (len(seen_from), 1))
     if options.shading != "center":
         eyes[:, 0] = seen_from
     normals = np.where(surfels.normals.any(axis=1, keepdims=True), surfels.normals, (0.0, 0.0, -1.0))
-    away = np.sum(normals * (centre - surfels.positions), axis=1, keepdims=True) < 0
+    away = np.sum(normals * (eyes - surfels.positions), axis=1, keepdims=True) < 0
     reflected, highlight = illuminate(
         surfels.positions, np.where(away, -normals, normals), eyes, surfels.material, lights
     )

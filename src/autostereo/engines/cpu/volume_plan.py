@@ -1,0 +1,58 @@
+"""Where a volume's slices lie, and whether views may share the slabs between them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...scene.volume import Volume
+from ..engine import Camera
+from .volume_rays import RAYS
+from .volume_sample import Slices
+from .volume_setup import depth_range
+from .volume_shared import MAX_LENGTH
+
+STEEPEST = 1.0  # greatest offset of a camera over the nearest depth, up to which views may share slabs
+SLIDE = (1.0, 2.0)  # most pixels by which a shared slab's front and back part, in views and, coarser by nature, panels
+MAX_PLANES = 2**20
+
+
+def make_slices(volumes: list[Volume], camera: Camera, step: float) -> Slices | None:
+    """Slices through all volumes (see reference.volume.planes); None when nothing lies behind the near plane."""
+    first, last = depth_range(volumes, camera)
+    if last <= first:
+        return None
+    count = (last - first) / (step * min(float(v.voxel_size.min()) for v in volumes))
+    if count > MAX_PLANES:
+        raise InputError(f"options step: {step:g} voxels make {count:.3g} slabs of the volumes, at most {MAX_PLANES}")
+    slabs = max(1, int(np.ceil(count)))
+    return Slices(first, (last - first) / slabs, slabs)
+
+
+def share_slices(slices: Slices, camera: Camera, offsets: NDArray[np.float64], most: float) -> Slices:
+    """The same slices, or ones closer by a whole factor.
+
+    A slab moves as one, though its front and its back part in views aside: by `most` pixels, no more.
+    """
+    after = slices.first + slices.distance  # the nearest slab is the one that moves most
+    slide = float(np.abs(offsets).max()) * camera.fx * (1 / slices.first - 1 / after)
+    parts = int(np.clip(np.ceil(slide / most), 1, MAX_PLANES // slices.slabs))
+    return Slices(slices.first, slices.distance / parts, slices.slabs * parts)
+
+
+def shared_reach(
+    camera: Camera, slices: Slices, offsets: NDArray[np.float64], fine: int, phases: int
+) -> tuple[float, int]:
+    """Where shared slabs begin, in pixels, and their positions of a phase, so that they reach as far as views see."""
+    ends = np.array([slices.first, slices.first + slices.slabs * slices.distance])
+    shifts = np.outer(offsets, camera.fx / camera.focal - camera.fx / ends)
+    begin = float(np.floor(-shifts.max())) - 2.0
+    positions = (camera.width - float(shifts.min()) + 2.0 - begin) * fine
+    return begin, -(-int(np.ceil(positions / phases) + 2) // RAYS) * RAYS
+
+
+def can_share(camera: Camera, slices: Slices, offsets: NDArray[np.float64]) -> bool:
+    """Whether slabs may be shared: not by cameras amid the volume, which see a slab from all sides."""
+    flat = float(np.abs(offsets).max()) <= STEEPEST * slices.first
+    return flat and shared_reach(camera, slices, offsets, 1, 1)[1] <= MAX_LENGTH
