@@ -12,6 +12,7 @@ import autostereo as aus
 from autostereo.engines.engine import ENGINES, Camera, Draw, get_engine
 from autostereo.engines.reference.engine import ReferenceEngine, panel_samples, view_samples, visible_hits
 from autostereo.engines.reference.mesh import Samples, Surface, trace
+from gl_device import need_device
 
 SIZE = (40, 30)
 RIG = aus.Rig(position=(0, 0, 4), fov_y=40, baseline=1.2, views=5, near=0.2)
@@ -20,6 +21,8 @@ OTHER_ENGINES = [name for name in ENGINES if name != "reference"]
 
 def need(engine: str) -> str:
     """The engine's name; skips, saying why, where it or the public door is not there."""
+    if engine == "gl":
+        need_device()
     if importlib.util.find_spec("autostereo.render") is None:
         pytest.skip("cannot be compared: there is no autostereo.render yet")
     try:
