@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from ...scene.scene import Scene
 from ...transforms import apply
 from ...viewmap import ViewMap
-from ..constants import ATLAS_VIEWS, MAX_CELLS
+from ..constants import ATLAS_VIEWS, MAX_CAMERAS, MAX_CELLS
 from ..engine import Camera
 from .context import Device
 from .programs import Defines
 
-BINDINGS = {"Frame": 0, "Views": 1, "ViewMap": 2}  # the uniform blocks of shaders/lib; others begin at 3
+BINDINGS = {"Frame": 0, "Views": 1, "ViewMap": 2, "Cameras": 3}  # the uniform blocks of shaders/lib; others from 4 on
 MASK_UNIT = 15  # texture unit of a mask's table
 MARGIN = 1e-3  # by which depth buffers reach beyond the scene, so that rounding clips nothing
 
@@ -74,11 +74,18 @@ def views_block(offsets: NDArray[np.float64], tiles: NDArray[np.int64], sizes: t
     return block
 
 
+def cameras_block(offsets: NDArray[np.float64]) -> NDArray[np.float32]:
+    """The block Cameras (MAX_CAMERAS,) float32: offsets (V,) of all views of a panel."""
+    block = np.zeros(MAX_CAMERAS, np.float32)
+    block[: len(offsets)] = offsets
+    return block
+
+
 class Blocks:
     """The buffers behind the uniform blocks, kept from frame to frame."""
 
     def __init__(self, device: Device) -> None:
-        sizes = {"Frame": 28 * 4, "Views": (1 + ATLAS_VIEWS) * 16}
+        sizes = {"Frame": 28 * 4, "Views": (1 + ATLAS_VIEWS) * 16, "Cameras": MAX_CAMERAS * 4}
         self._buffers = {name: device.ctx.buffer(reserve=size) for name, size in sizes.items()}
 
     def write(self, name: str, values: NDArray[Any]) -> None:

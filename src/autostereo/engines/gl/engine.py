@@ -39,7 +39,7 @@ from ...scene.scene import Scene
 from ..engine import Draw, Target
 from ..gathering import check_interlace, quilt_tiles
 from . import frames
-from .blocks import Blocks, DepthRange, Mask
+from .blocks import Blocks, DepthRange, Mask, cameras_block
 from .context import Device, get_device
 from .job import Job, Kept
 from .mesh import Meshes
@@ -47,7 +47,7 @@ from .panel import Panel
 
 STAGES: tuple[tuple[type, type[Any]], ...] = ((Mesh, Meshes),)
 METHODS: dict[type, tuple[str, ...]] = {
-    Mesh: ("single-pass", "n-pass", "n-pass-subres", "n-pass-masked", "instanced"),
+    Mesh: ("single-pass", "n-pass", "n-pass-subres", "n-pass-masked", "instanced", "covering-quad"),
 }
 PANELS_ONLY = ("n-pass-subres", "n-pass-masked", "covering-quad")
 
@@ -153,6 +153,7 @@ def with_mask(job: Job) -> Job:
     """The job with its panel's mask, that of the frame before if it still fits."""
     viewmap = job.draw.viewmap
     assert viewmap is not None
+    job.blocks.write("Cameras", cameras_block(job.draw.offsets))
     return replace(job, mask=job.kept.get("mask", viewmap, lambda: Mask(job.device, viewmap)))
 
 

@@ -44,6 +44,34 @@ class Meshes(Stage):
             job.vertex_array(program, content, part.indices).render(instances=len(tiles))
         enable_clipping(ctx, False)
 
+    def draw_channels(self, job: Job) -> None:
+        """Draw a covering quad per triangle and channel."""
+        ctx = job.device.ctx
+        assert job.columns is not None
+        job.atlas.target.use()
+        ctx.enable_only(ctx.DEPTH_TEST)
+        for part in self._parts:
+            program = job.masked_program("quad.vert", "quad.frag", defines=switches(job, part), version=430)
+            set_material(program, job, part)
+            part.vertices.bind_to_storage_buffer(0)
+            part.indices.bind_to_storage_buffer(1)
+            program["reach"] = job.draw.culling
+            quads = job.vertex_array(program, [], job.kept.get("quads", self._most, lambda: self._quads(job.device)))
+            for tile in range(job.count):
+                channel = job.first + tile
+                program["tile"], program["channel"] = tile, channel
+                program["sample_at"] = job.columns[channel], job.row
+                quads.render(vertices=6 * part.triangles)
+
+    @property
+    def _most(self) -> int:
+        return max(part.triangles for part in self._parts)
+
+    def _quads(self, device: Device) -> Any:
+        """Indices of two triangles for each four vertices."""
+        first = 4 * np.arange(self._most, dtype=np.uint32)[:, None]
+        return device.ctx.buffer((first + np.array([0, 1, 2, 2, 1, 3], np.uint32)).tobytes())
+
 
 def _attributes(part: Part) -> tuple[str, ...]:
     formats, names = part.layout

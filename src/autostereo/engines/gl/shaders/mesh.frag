@@ -17,7 +17,7 @@ out vec4 color;
 
 void main() {
 #ifdef TEXTURED
-    vec3 paint = textured(vertex.surface.uv, gl_FragCoord.w).rgb;
+    vec3 paint = rasterised(vertex.surface.uv, gl_FragCoord.w);
 #else
     vec3 paint = vec3(1.0);
 #endif

@@ -100,3 +100,38 @@ vec3 surface_color(Surface s, bool front, float v, vec3 paint) {
     return color * paint + highlight;
 }
 #endif
+
+#ifdef MIXING
+// The surface at `point`, between three vertices of these weights.
+Surface mixed(Surface at[3], vec3 w, vec3 point) {
+    Surface s;
+#ifdef VERTEX_LIGHTING
+    s.front = w.x * at[0].front + w.y * at[1].front + w.z * at[2].front;
+#ifdef TWO_SIDED
+    s.back = w.x * at[0].back + w.y * at[1].back + w.z * at[2].back;
+#endif
+#ifdef SHINY
+    s.front_highlight = w.x * at[0].front_highlight + w.y * at[1].front_highlight + w.z * at[2].front_highlight;
+#ifdef TWO_SIDED
+    s.back_highlight = w.x * at[0].back_highlight + w.y * at[1].back_highlight + w.z * at[2].back_highlight;
+#endif
+#endif
+#else
+    s.color = w.x * at[0].color + w.y * at[1].color + w.z * at[2].color;
+    s.normal = w.x * at[0].normal + w.y * at[1].normal + w.z * at[2].normal;
+#ifdef PLACED
+    s.point = point;
+#endif
+#endif
+#ifdef TEXTURED
+    s.uv = w.x * at[0].uv + w.y * at[1].uv + w.z * at[2].uv;
+#endif
+    return s;
+}
+
+#ifdef TEXTURED
+vec2 uv_of(Surface at[3], vec3 w) {
+    return w.x * at[0].uv + w.y * at[1].uv + w.z * at[2].uv;
+}
+#endif
+#endif
