@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...scene.scene import Scene
 from ...transforms import apply
 from ...viewmap import ViewMap
-from ..constants import ATLAS_VIEWS, MAX_CAMERAS, MAX_CELLS
+from ..constants import ATLAS_VIEWS, LEVELS, MAX_CAMERAS, MAX_CELLS
 from ..engine import Camera
 from .context import Device
 from .programs import Defines
@@ -23,6 +23,11 @@ from .programs import Defines
 BINDINGS = {"Frame": 0, "Views": 1, "ViewMap": 2, "Cameras": 3}  # the uniform blocks of shaders/lib; others from 4 on
 MASK_UNIT = 15  # texture unit of a mask's table
 MARGIN = 1e-3  # by which depth buffers reach beyond the scene, so that rounding clips nothing
+
+
+def stored_background(scene: Scene) -> NDArray[np.float64]:
+    """The background (3,) as it is stored, ⌊255·v + ½⌋/255."""
+    return np.asarray(np.floor(np.array(scene.background) * LEVELS + 0.5) / LEVELS)
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,10 @@ from .panel import Panel
 
 STAGES: tuple[tuple[type, type[Any]], ...] = ((Mesh, Meshes),)
 METHODS: dict[type, tuple[str, ...]] = {
-    Mesh: ("single-pass", "n-pass", "n-pass-subres", "n-pass-masked", "instanced", "covering-quad"),
+    Mesh: (
+        *("single-pass", "n-pass", "n-pass-subres", "n-pass-masked"),
+        *("instanced", "geometry-shader", "geometry-shader-painter", "covering-quad"),
+    ),
 }
 PANELS_ONLY = ("n-pass-subres", "n-pass-masked", "covering-quad")
 

@@ -16,6 +16,7 @@ from ...errors import UnsupportedError
 from ..engine import Target
 from ..gathering import Tiles
 from .atlas import Atlas, Layout
+from .blocks import stored_background
 from .job import Job, Stage
 from .panel import ALL, Mean, Panel
 
@@ -45,15 +46,20 @@ def passes(job: Job) -> Iterator[range]:
         step = 1
     elif method == "geometry-shader":
         step = job.draw.options.views_per_pass or job.count
+    elif method == "geometry-shader-painter":
+        step = targets_per_pass(job)
     else:
         step = job.count
     for start in range(0, job.count, step):
         yield range(start, min(start + step, job.count))
 
 
-def background(job: Job) -> NDArray[np.float64]:
-    """The scene's background as it is stored, ⌊255·v + ½⌋/255."""
-    return np.floor(np.array(job.scene.background) * 255.0 + 0.5) / 255.0
+def targets_per_pass(job: Job) -> int:
+    """Views of a pass that has a render target for each (de Sorbier 2008, section 4.2: "limits … to eight")."""
+    most, asked = job.device.limits.draw_buffers, job.draw.options.views_per_pass
+    if asked is not None and min(asked, job.count) > most:
+        raise UnsupportedError(f"views_per_pass {asked}: this device has {most} render targets: choose fewer, or None")
+    return asked or most
 
 
 def draw_tiles(job: Job, stages: list[Stage], channels: tuple[float, ...] | None = None) -> None:
@@ -61,7 +67,7 @@ def draw_tiles(job: Job, stages: list[Stage], channels: tuple[float, ...] | None
 
     channels: of a panel, those that are to be gathered: what the mask hides of them need not be drawn.
     """
-    job.atlas.clear(background(job))
+    job.atlas.clear(stored_background(job.scene))
     for tiles in passes(job):
         if channels is not None and job.draw.method in MASKED:
             _hide(job, tiles, channels)
@@ -168,7 +174,7 @@ def _gather_channels(job: Job, stages: list[Stage], panel: Panel, sample: tuple[
     columns = tuple((c + x) / 3 if own else x for c in range(3))
     for first in range(0, 3, layout.count):
         part = job.with_atlas(atlas, first, min(layout.count, 3 - first), (columns, y))
-        atlas.clear(background(job))
+        atlas.clear(stored_background(job.scene))
         for stage in stages:
             stage.draw_channels(part)
         panel.gather(part)

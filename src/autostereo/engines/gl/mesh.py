@@ -1,7 +1,8 @@
 """Meshes on the gl engine: into the tiles of views.
 
 `n-pass` draws a view at a time and `instanced` all views of an atlas in one call, through the same shaders, so that
-they cannot differ.
+they cannot differ. `geometry-shader` (de Sorbier 2008) makes copies of each triangle after its vertices were processed
+once; `covering-quad` (Hübner 2007b) meets triangles from each sub-pixel's own camera.
 """
 
 from __future__ import annotations
@@ -12,8 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import UnsupportedError
 from ...scene.mesh import Mesh
 from ..reference.shading import lights_in_eye_space
+from . import mesh_painter as painter
 from .atlas import enable_clipping
 from .context import Device
 from .job import Job, Stage
@@ -21,6 +24,8 @@ from .mesh_buffers import Part, upload_meshes
 from .programs import Defines
 
 IMAGE_UNIT = 0
+GEOMETRY_NUMBERS = 1024  # that one geometry shader may put out: OpenGL promises no more
+POSITION_NUMBERS = 9  # position, four clip distances, camera offset
 
 
 class Meshes(Stage):
@@ -31,18 +36,55 @@ class Meshes(Stage):
 
     def draw_views(self, job: Job, tiles: range) -> None:
         """Draw the views of these tiles, each part in one call."""
+        if job.draw.method == "geometry-shader-painter":
+            self._paint(job, tiles)
+            return
         ctx = job.device.ctx
+        duplicate = job.draw.method == "geometry-shader"
         job.atlas.target.use()
         enable_clipping(ctx, True)
         ctx.front_face = "cw"  # row 0 is the top
         for part in self._parts:
             set_sides(ctx, part)
+            if duplicate:
+                self._duplicate(job, part, tiles)
+                continue
             program = job.program("mesh.vert", "mesh.frag", defines=switches(job, part))
             set_material(program, job, part)
             program["first_view"] = tiles.start
-            content = [(part.vertices, *_attributes(part))]
-            job.vertex_array(program, content, part.indices).render(instances=len(tiles))
+            self._vertex_array(job, program, part).render(instances=len(tiles))
         enable_clipping(ctx, False)
+
+    def _duplicate(self, job: Job, part: Part, tiles: range) -> None:
+        """Every triangle becomes as many as there are views (de Sorbier 2008), in the geometry shader."""
+        defines = switches(job, part)
+        copies = copies_at_once(job, defines, len(tiles))
+        files = "mesh_points.vert", "mesh.geom", "mesh.frag"
+        program = job.program(*files, defines={**defines, "MAX_VERTICES": 3 * copies})
+        set_material(program, job, part)
+        for first in range(tiles.start, tiles.stop, copies):
+            program["first_view"], program["copies"] = first, min(copies, tiles.stop - first)
+            self._vertex_array(job, program, part).render()
+
+    def _vertex_array(self, job: Job, program: Any, part: Part) -> Any:
+        formats, names = part.layout
+        return job.vertex_array(program, [(part.vertices, formats, *names)], part.indices)
+
+    def _paint(self, job: Job, tiles: range) -> None:
+        """A render target per view, from back to front, as the paper has it: mesh_painter.py."""
+        ctx = job.device.ctx
+        targets = painter.begin(job, tiles)
+        ctx.front_face = "cw"
+        ctx.blend_func = ctx.ONE, ctx.ONE_MINUS_SRC_ALPHA
+        for part in painter.sorted_parts(job, self._parts):
+            ctx.enable_only(ctx.BLEND if part.two_sided else ctx.BLEND | ctx.CULL_FACE)
+            copies = {"PAINTER": True, "TARGETS": len(tiles), "MAX_VERTICES": 3 * len(tiles)}
+            files = "mesh_points.vert", "mesh.geom", "mesh_targets.frag"
+            program = job.program(*files, defines={**switches(job, part), **copies})
+            set_material(program, job, part)
+            program["first_view"], program["copies"] = 0, len(tiles)
+            self._vertex_array(job, program, part).render()
+        painter.finish(job, tiles, targets)
 
     def draw_channels(self, job: Job) -> None:
         """Draw a covering quad per triangle and channel."""
@@ -73,14 +115,29 @@ class Meshes(Stage):
         return device.ctx.buffer((first + np.array([0, 1, 2, 2, 1, 3], np.uint32)).tobytes())
 
 
-def _attributes(part: Part) -> tuple[str, ...]:
-    formats, names = part.layout
-    return (formats, *names)
-
-
 def set_sides(ctx: Any, part: Part) -> None:
     """Test depth, and cull back sides unless they are seen."""
     ctx.enable_only(ctx.DEPTH_TEST if part.two_sided else ctx.DEPTH_TEST | ctx.CULL_FACE)
+
+
+def copies_at_once(job: Job, defines: Defines, views: int) -> int:
+    """How many copies of a triangle a geometry shader can make, `views` at most.
+
+    Raises
+    ------
+    UnsupportedError
+        More are asked for by `Options.views_per_pass`.
+    """
+    own = 10 if defines["VERTEX_LIGHTING"] else 6  # numbers of lib/surface.glsl, at most
+    numbers = POSITION_NUMBERS + own + 3 * bool(defines["PLACED"]) + 2 * bool(defines["TEXTURED"])
+    most = min(GEOMETRY_NUMBERS // numbers, job.device.limits.geometry_vertices) // 3
+    asked = job.draw.options.views_per_pass
+    if asked is not None and min(asked, views) > most:
+        raise UnsupportedError(
+            f"views_per_pass {asked}: geometry shaders of this device make at most {most} copies of such a triangle, "
+            f"{GEOMETRY_NUMBERS} numbers: choose fewer, or None"
+        )
+    return min(views, most)
 
 
 def switches(job: Job, part: Part) -> Defines:
