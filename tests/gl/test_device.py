@@ -129,6 +129,7 @@ def test_a_picture_above_the_limit_is_named():
 
 def test_auto_is_the_cpu_on_software(monkeypatch):
     from autostereo.engines import engine
+    from autostereo.engines.gl import engine as gl_engine
 
     engine.gpu_answers.cache_clear()
     device = need_device()
@@ -139,6 +140,8 @@ def test_auto_is_the_cpu_on_software(monkeypatch):
     monkeypatch.setattr(context, "hardware_answers", lambda: True)
     assert engine.choose_engine(SCENE) == "gl"
     assert aus.Renderer(SCENE).engine.name == "gl"
+    monkeypatch.setattr(gl_engine, "METHODS", {})  # a GPU, and a scene that gl does not draw
+    assert engine.choose_engine(SCENE) == "cpu"
     engine.gpu_answers.cache_clear()
 
 

@@ -21,7 +21,6 @@ from .job import Job, Stage
 from .panel import ALL, Mean, Panel
 
 CHANNELS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-MASKED = ("n-pass-masked",)  # methods that do not shade what the mask hides
 
 
 def sample_positions(samples: int) -> list[tuple[float, float]]:
@@ -67,12 +66,34 @@ def draw_tiles(job: Job, stages: list[Stage], channels: tuple[float, ...] | None
 
     channels: of a panel, those that are to be gathered: what the mask hides of them need not be drawn.
     """
-    job.atlas.clear(stored_background(job.scene))
+    if channels is not None and job.draw.method == "single-pass":
+        _start_masked(job, channels)
+        hide = False
+    else:
+        job.atlas.clear(stored_background(job.scene))
+        hide = channels is not None and job.draw.method == "n-pass-masked"
     for tiles in passes(job):
-        if channels is not None and job.draw.method in MASKED:
+        if hide and channels is not None:
             _hide(job, tiles, channels)
         for stage in stages:
             stage.draw_views(job, tiles)
+
+
+def _start_masked(job: Job, channels: tuple[float, ...]) -> None:
+    """An empty atlas with all that the mask hides already hidden: made once, then copied in every frame."""
+    ctx, scene, draw = job.device.ctx, job.scene, job.draw
+
+    def masked(part: Job) -> Atlas:
+        part.atlas.clear(stored_background(scene))
+        _hide(part, range(part.count), channels)
+        return part.atlas
+
+    if job.count < len(draw.offsets) or channels != ALL:  # other masks follow: nothing that could be kept
+        masked(job)
+        return
+    key = job.atlas.layout, draw.viewmap, draw.flip_x, draw.flip_y
+    blank = job.kept.get("blank", key, lambda: masked(replace(job, atlas=Atlas(job.device, job.atlas.layout))))
+    ctx.copy_framebuffer(job.atlas.target, blank.target)
 
 
 def _hide(job: Job, tiles: range, channels: tuple[float, ...]) -> None:
@@ -169,11 +190,12 @@ def _gather_channels(job: Job, stages: list[Stage], panel: Panel, sample: tuple[
     x, y = sample
     own = job.draw.options.sampling == "subpixel"
     job.write_frame(job.draw.camera)
-    layout = Layout.fitting(3, panel.size, job.device.limits)
+    tiles = 3 if job.draw.options.alpha == "exact" else 1  # one depth for all three channels
+    layout = Layout.fitting(tiles, panel.size, job.device.limits)
     atlas = job.kept.get("channels", layout, lambda: Atlas(job.device, layout))
     columns = tuple((c + x) / 3 if own else x for c in range(3))
-    for first in range(0, 3, layout.count):
-        part = job.with_atlas(atlas, first, min(layout.count, 3 - first), (columns, y))
+    for first in range(0, tiles, layout.count):
+        part = job.with_atlas(atlas, first, min(layout.count, tiles - first), (columns, y))
         atlas.clear(stored_background(job.scene))
         for stage in stages:
             stage.draw_channels(part)

@@ -70,6 +70,11 @@ class Job:
     columns: tuple[float, ...] | None = None
     row: float = 0.5
 
+    @property
+    def one_depth(self) -> bool:
+        """Whether the channels of a panel share one tile, and so one depth: `Options.alpha` is not "exact"."""
+        return self.columns is not None and self.draw.options.alpha != "exact"
+
     def with_atlas(
         self, atlas: Atlas, first: int, count: int, positions: tuple[tuple[float, ...] | None, float] = (None, 0.5)
     ) -> Job:

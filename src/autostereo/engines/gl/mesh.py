@@ -24,6 +24,7 @@ from .mesh_buffers import Part, upload_meshes
 from .programs import Defines
 
 IMAGE_UNIT = 0
+ONE_MINUS_SRC1_COLOR = 0x88FA  # GL_ONE_MINUS_SRC1_COLOR: a channel is replaced where the second output is 1
 GEOMETRY_NUMBERS = 1024  # that one geometry shader may put out: OpenGL promises no more
 POSITION_NUMBERS = 9  # position, four clip distances, camera offset
 
@@ -91,9 +92,13 @@ class Meshes(Stage):
         ctx = job.device.ctx
         assert job.columns is not None
         job.atlas.target.use()
-        ctx.enable_only(ctx.DEPTH_TEST)
+        ctx.enable_only(ctx.DEPTH_TEST | ctx.BLEND if job.one_depth else ctx.DEPTH_TEST)
+        ctx.blend_func = ctx.ONE, ONE_MINUS_SRC1_COLOR
+        depth = {"ONE_DEPTH": job.one_depth, "MEAN_DEPTH": job.draw.options.alpha == "averaged"}
         for part in self._parts:
-            program = job.masked_program("quad.vert", "quad.frag", defines=switches(job, part), version=430)
+            program = job.masked_program(
+                "quad.vert", "quad.frag", defines={**switches(job, part), **depth}, version=430
+            )
             set_material(program, job, part)
             part.vertices.bind_to_storage_buffer(0)
             part.indices.bind_to_storage_buffer(1)
@@ -101,8 +106,10 @@ class Meshes(Stage):
             quads = job.vertex_array(program, [], job.kept.get("quads", self._most, lambda: self._quads(job.device)))
             for tile in range(job.count):
                 channel = job.first + tile
-                program["tile"], program["channel"] = tile, channel
-                program["sample_at"] = job.columns[channel], job.row
+                program["tile"] = tile
+                _set(program, "sample_at", [(column, job.row) for column in job.columns])
+                if "channel" in program:
+                    program["channel"] = channel
                 quads.render(vertices=6 * part.triangles)
 
     @property

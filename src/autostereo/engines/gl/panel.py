@@ -48,7 +48,9 @@ class Panel:
     def gather(self, job: Job, channels: tuple[float, ...] = ALL) -> None:
         """Add those sub-pixels of `channels` (three of 0 and 1) that the job's atlas holds."""
         ctx = self.device.ctx
-        defines: Defines = {"CHANNELS": job.columns is not None, "WITH_DEPTH": self.depth is not None}
+        defines: Defines = {
+            "CHANNELS": job.columns is not None, "ONE_TILE": job.one_depth, "WITH_DEPTH": self.depth is not None
+        }
         program = job.masked_program("screen.vert", "compose.frag", defines=defines)
         job.atlas.color.use(0)
         program["atlas_color"] = 0

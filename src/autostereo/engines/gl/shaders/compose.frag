@@ -1,7 +1,8 @@
 // Gathers the sub-pixels of a panel from an atlas: of views by the mask, or of channels.
 //
 // Several atlases add up: what an atlas does not hold is 0. Switches: those of lib/viewmap.glsl; CHANNELS: the atlas has
-// three tiles, one for the sub-pixels of each channel; WITH_DEPTH: eye depths too. I(x,y) = I_mask(x,y)(x,y), Huebner 2007b 2.3.
+// three tiles, one for the sub-pixels of each channel; ONE_TILE: one for
+// all three; WITH_DEPTH: eye depths too. I(x,y) = I_mask(x,y)(x,y), Huebner 2007b 2.3.
 #include "lib/frame.glsl"
 #include "lib/views.glsl"
 #include "lib/viewmap.glsl"
@@ -20,7 +21,9 @@ void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
     ivec2 size = ivec2(atlas_size.zw);
     ivec2 from = mirrored(at, size);
-#ifdef CHANNELS
+#if defined(ONE_TILE)
+    ivec3 view = ivec3(0);
+#elif defined(CHANNELS)
     ivec3 view = ivec3(0, 1, 2) - held.x;
 #else
     ivec3 view = nearest_views(at.x, at.y) - held.x;

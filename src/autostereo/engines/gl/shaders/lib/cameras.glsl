@@ -28,8 +28,3 @@ vec3 offsets_of_subpixels(int x, int r) {
 #endif
     return offset;
 }
-
-// The same of one channel.
-float offset_of_subpixel(int x, int r, int c) {
-    return offsets_of_subpixels(x, r)[c];
-}
