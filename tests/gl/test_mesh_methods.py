@@ -15,7 +15,7 @@ from autostereo.engines.gl.mesh_buffers import split_by_repeat
 from gl_device import need_device
 
 W, H = SIZE
-SAME_TILES = ["single-pass", "instanced", "n-pass-masked", "geometry-shader"]
+SAME_TILES = ["single-pass in views", "instanced", "n-pass-masked", "geometry-shader"]
 SILHOUETTE = 0.002  # share of samples that rays and rasterised views may see otherwise
 OPTIONS = {
     "plain": {},
@@ -32,6 +32,11 @@ def device():
 
 
 def render(scene, display, method, rig=RIG, **options):
+    """A panel; "single-pass in views" draws views also where rays are expected to be faster."""
+    if method == "single-pass in views":
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(frames, "CLEARLY", 0.0)
+            return render(scene, display, "single-pass", rig, **options)
     rig = rig.with_views(display.views)
     return aus.render(scene, display, rig, method=method, engine="gl", options=aus.Options(**options)).pixels
 
@@ -125,6 +130,25 @@ def test_views_of_an_atlas_are_the_frames_of_single_cameras(scene):
     assert difference[inside].max() <= 1
     assert (difference > 1).mean() <= SILHOUETTE
     np.testing.assert_allclose(stack.depth[inside], depth[inside], rtol=1e-4)
+
+
+def test_a_single_pass_takes_the_cheaper_way():
+    """Few triangles for many views: rays; many triangles for few views: views. Continuous panels always rays."""
+    from autostereo.engines.engine import get_engine
+
+    few = aus.Scene(aus.Mesh([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], [[0, 1, 2]]))
+    many = aus.Scene(aus.Mesh(*sphere(5)))
+    slanted = {"lens_pitch": 5.7, "subpixel_pitch": 1.0, "slant_deg": 9.5}
+    size = 160, 120
+    for scene, display, rays in [
+        (few, aus.Display.slanted(*size, 45, **slanted), True),
+        (many, aus.Display.wavelength_selective(*size), False),
+        (many, aus.Display.slanted(*size, 8, **slanted, continuous=True), True),
+    ]:
+        renderer = aus.Renderer(scene, get_engine("gl").name)
+        renderer.render(display, RIG.with_views(display.views))
+        assert ("channels" in renderer._prepared.kept) is rays
+        assert ("atlas" in renderer._prepared.kept) is not rays
 
 
 # --- every sub-pixel for its own camera ----------------------------------------------------------------

@@ -20,6 +20,8 @@ from .blocks import stored_background
 from .job import Job, Stage
 from .panel import ALL, Mean, Panel
 
+VIEW_PIXEL = 15e-9  # seconds of a CPU that drawing for it takes per pixel of an atlas, in any scene, measured
+CLEARLY = 0.7  # of the expected time: estimates err
 CHANNELS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -66,34 +68,29 @@ def draw_tiles(job: Job, stages: list[Stage], channels: tuple[float, ...] | None
 
     channels: of a panel, those that are to be gathered: what the mask hides of them need not be drawn.
     """
-    if channels is not None and job.draw.method == "single-pass":
-        _start_masked(job, channels)
-        hide = False
+    whole = channels == ALL and job.count == len(job.draw.offsets)  # else masks change within a frame
+    if whole and job.draw.method == "single-pass":
+        _start_masked(job)
     else:
         job.atlas.clear(stored_background(job.scene))
-        hide = channels is not None and job.draw.method == "n-pass-masked"
     for tiles in passes(job):
-        if hide and channels is not None:
+        if channels is not None and job.draw.method == "n-pass-masked":
             _hide(job, tiles, channels)
         for stage in stages:
             stage.draw_views(job, tiles)
 
 
-def _start_masked(job: Job, channels: tuple[float, ...]) -> None:
+def _start_masked(job: Job) -> None:
     """An empty atlas with all that the mask hides already hidden: made once, then copied in every frame."""
-    ctx, scene, draw = job.device.ctx, job.scene, job.draw
 
-    def masked(part: Job) -> Atlas:
-        part.atlas.clear(stored_background(scene))
-        _hide(part, range(part.count), channels)
+    def masked() -> Atlas:
+        part = replace(job, atlas=Atlas(job.device, job.atlas.layout))
+        part.atlas.clear(stored_background(job.scene))
+        _hide(part, range(part.count), ALL)
         return part.atlas
 
-    if job.count < len(draw.offsets) or channels != ALL:  # other masks follow: nothing that could be kept
-        masked(job)
-        return
-    key = job.atlas.layout, draw.viewmap, draw.flip_x, draw.flip_y
-    blank = job.kept.get("blank", key, lambda: masked(replace(job, atlas=Atlas(job.device, job.atlas.layout))))
-    ctx.copy_framebuffer(job.atlas.target, blank.target)
+    key = job.atlas.layout, job.draw.viewmap, job.draw.flip_x, job.draw.flip_y
+    job.device.ctx.copy_framebuffer(job.atlas.target, job.kept.get("masked", key, masked).target)
 
 
 def _hide(job: Job, tiles: range, channels: tuple[float, ...]) -> None:
@@ -141,10 +138,21 @@ def _draw_samples(job: Job, stages: list[Stage], depth: NDArray[np.float32] | No
 # --- panels --------------------------------------------------------------------------------------------------
 
 
-def by_channels(job: Job) -> bool:
-    """Whether the panel's sub-pixels are drawn for their own cameras, and not views."""
-    viewmap, method = job.draw.viewmap, job.draw.method
-    return method == "covering-quad" or (method == "single-pass" and viewmap is not None and viewmap.continuous)
+def by_channels(job: Job, stages: list[Stage]) -> bool:
+    """Whether the panel's sub-pixels are drawn for their own cameras, and not views.
+
+    In a single pass: where cameras lie between views, and where it is expected to be clearly faster, as where few
+    triangles are seen by many views.
+    """
+    draw = job.draw
+    assert draw.viewmap is not None
+    if draw.method != "single-pass":
+        return draw.method == "covering-quad"
+    if draw.viewmap.continuous or not stages:
+        return True
+    views = VIEW_PIXEL * len(draw.offsets) * draw.camera.width * draw.camera.height
+    costs = [stage.costs(job) for stage in stages]
+    return sum(channels for _, channels in costs) < CLEARLY * (views + sum(own for own, _ in costs))
 
 
 def draw_panel(job: Job, stages: list[Stage], target: Target) -> None:
@@ -162,9 +170,10 @@ def draw_panel(job: Job, stages: list[Stage], target: Target) -> None:
     mean = job.kept.get("panel mean", size, lambda: Mean(job.device, size)) if samples[1:] else None
     if mean is not None:
         mean.clear()
+    gather = _gather_channels if by_channels(job, under) else _gather_views
     for sample in samples:
         panel.clear()
-        (_gather_channels if by_channels(job) else _gather_views)(job, under, panel, sample)
+        gather(job, under, panel, sample)
         for stage in over:
             stage.draw_panel(job, panel)
         if mean is not None:

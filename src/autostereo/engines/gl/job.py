@@ -23,6 +23,9 @@ class Kept:
     def __init__(self) -> None:
         self._made: dict[Hashable, tuple[Any, Any]] = {}
 
+    def __contains__(self, name: Hashable) -> bool:
+        return name in self._made
+
     def get(self, name: Hashable, key: Any, make: Callable[[], Any]) -> Any:
         """What `make` returned for `name` and this key; with another key the old one is let go and made anew."""
         if name not in self._made or self._made[name][0] != key:
@@ -128,6 +131,10 @@ class Stage:
     def draws_over(self, job: Job) -> bool:
         """Whether this draw of a panel uses `draw_panel`, in place of the others."""
         return False
+
+    def costs(self, job: Job) -> tuple[float, float]:
+        """Expected seconds of `draw_views` of all views of a panel, and of `draw_channels`, on a CPU; to compare."""
+        return 0.0, float("inf")
 
     def draw_views(self, job: Job, tiles: range) -> None:
         """Draw the views of some tiles of the job's atlas."""

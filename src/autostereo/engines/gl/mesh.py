@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ...errors import UnsupportedError
 from ...scene.mesh import Mesh
+from ...transforms import apply
 from ..reference.shading import lights_in_eye_space
 from . import mesh_painter as painter
 from .atlas import enable_clipping
@@ -24,6 +25,9 @@ from .mesh_buffers import Part, upload_meshes
 from .programs import Defines
 
 IMAGE_UNIT = 0
+FEW = 500  # triangles that stand for all where costs are estimated
+# seconds of a CPU, measured on llvmpipe: a triangle in one view; one with its covering quads, and a fragment of those
+VIEW_TRIANGLE, QUAD_TRIANGLE, QUAD_FRAGMENT = 0.28e-6, 11e-6, 28e-9
 ONE_MINUS_SRC1_COLOR = 0x88FA  # GL_ONE_MINUS_SRC1_COLOR: a channel is replaced where the second output is 1
 GEOMETRY_NUMBERS = 1024  # that one geometry shader may put out: OpenGL promises no more
 POSITION_NUMBERS = 9  # position, four clip distances, camera offset
@@ -34,6 +38,19 @@ class Meshes(Stage):
 
     def __init__(self, device: Device, meshes: Sequence[Mesh], middle: NDArray[np.float64]) -> None:
         self._parts = upload_meshes(device, meshes, middle)
+        self._triangles, self._few = some_triangles(meshes)
+
+    def costs(self, job: Job) -> tuple[float, float]:
+        """From the sizes of some triangles' covering quads."""
+        camera, (left, right) = job.draw.camera, job.draw.culling
+        points = apply(camera.eye_from_world, self._few.reshape(-1, 3)).reshape(-1, 3, 3)
+        depth = np.maximum(points[..., 2], camera.near)
+        slide = camera.fx * (right - left) * np.abs(1 / camera.focal - 1 / depth).max(axis=1)
+        sides = np.ptp(points[..., :2] / depth[..., None], axis=1) * (camera.fx, camera.fy) + [1, 1]
+        width = np.minimum(sides[:, 0] + slide, camera.width)
+        area = float(np.mean(width * np.minimum(sides[:, 1], camera.height)))
+        views = VIEW_TRIANGLE * len(job.draw.offsets) * self._triangles
+        return views, self._triangles * (QUAD_TRIANGLE + 3 * QUAD_FRAGMENT * area)
 
     def draw_views(self, job: Job, tiles: range) -> None:
         """Draw the views of these tiles, each part in one call."""
@@ -120,6 +137,17 @@ class Meshes(Stage):
         """Indices of two triangles for each four vertices."""
         first = 4 * np.arange(self._most, dtype=np.uint32)[:, None]
         return device.ctx.buffer((first + np.array([0, 1, 2, 2, 1, 3], np.uint32)).tobytes())
+
+
+def some_triangles(meshes: Sequence[Mesh]) -> tuple[int, NDArray[np.float64]]:
+    """The number of triangles, and corners (n, 3, 3) in world space of a few of them, evenly picked."""
+    count = sum(len(mesh.faces) for mesh in meshes)
+    few = []
+    for mesh in meshes:
+        assert mesh.transform is not None
+        faces = mesh.faces[:: max(1, count // FEW)]
+        few.append(apply(mesh.transform, mesh.vertices[faces.ravel()]).reshape(-1, 3, 3))
+    return count, np.concatenate(few)
 
 
 def set_sides(ctx: Any, part: Part) -> None:
