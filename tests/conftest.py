@@ -9,6 +9,14 @@ from pathlib import Path
 import pytest
 
 from commandline import SQUARE, Result, Run
+from gl_device import gl_error
+
+
+@pytest.fixture(autouse=True)
+def no_gl_errors() -> Iterator[None]:
+    """No test leaves an OpenGL error behind."""
+    yield
+    assert gl_error() == "GL_NO_ERROR"
 
 
 @pytest.fixture

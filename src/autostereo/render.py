@@ -40,8 +40,9 @@ def render(
     display : Display
     rig : Rig, optional
         Cameras; the display's number of views is spread over its baseline. None: `Rig.frame(scene, display)`.
-    method : {"single-pass", "n-pass", "n-pass-subres"}
-    engine : {"auto", "cpu", "reference"}
+    method : str
+        "single-pass", "n-pass", "n-pass-subres"; engine gl has more: `get_engine("gl").methods`.
+    engine : {"auto", "cpu", "gl", "reference"}
     options : Options, optional
 
     Returns
@@ -79,12 +80,12 @@ class Renderer:
     Parameters
     ----------
     scene : Scene, object or sequence of objects
-    engine : {"auto", "cpu", "reference"}
+    engine : {"auto", "cpu", "gl", "reference"}
     """
 
     def __init__(self, scene: Any, engine: str = "auto") -> None:
         self.scene = Scene.of(scene)
-        self.engine = get_engine(engine)
+        self.engine = get_engine(engine, self.scene)
         self._prepared = self.engine.prepare(self.scene)
         self._held: dict[str, NDArray[Any]] = {}
 
@@ -107,7 +108,14 @@ class Renderer:
         target = Target(self._array("panel", out, (size[1], size[0], 3), np.uint8))
         offsets = rig.camera_offsets
         draw = Draw(
-            camera, offsets, culling_range(rig, display), display.viewmap, display.flip_x, display.flip_y, options
+            camera,
+            offsets,
+            culling_range(rig, display),
+            display.viewmap,
+            display.flip_x,
+            display.flip_y,
+            options,
+            method,
         )
         schedule.draw_panel(self.engine, self._prepared, draw, target)
         return Panel(target.color, share(target, options))
@@ -129,7 +137,7 @@ class Renderer:
         target = Target(self._array("views", out, (*shape, 4), np.uint8))
         if options.depth:
             target.depth = self._array("depth", None, shape, np.float32)
-        draw = Draw(camera, offsets, culling_range(rig), options=options)
+        draw = Draw(camera, offsets, culling_range(rig), options=options, method=method)
         schedule.draw_views(self.engine, self._prepared, draw, target)
         return ViewStack(target.color, target.depth, share(target, options))
 

@@ -12,6 +12,7 @@ import autostereo as aus
 from autostereo.engines.engine import ENGINES, Camera, Draw, get_engine
 from autostereo.engines.reference.engine import ReferenceEngine, panel_samples, view_samples, visible_hits
 from autostereo.engines.reference.mesh import Samples, Surface, trace
+from gl_device import need_device
 
 SIZE = (40, 30)
 RIG = aus.Rig(position=(0, 0, 4), fov_y=40, baseline=1.2, views=5, near=0.2)
@@ -20,6 +21,8 @@ OTHER_ENGINES = [name for name in ENGINES if name != "reference"]
 
 def need(engine: str) -> str:
     """The engine's name; skips, saying why, where it or the public door is not there."""
+    if engine == "gl":
+        need_device()
     if importlib.util.find_spec("autostereo.render") is None:
         pytest.skip("cannot be compared: there is no autostereo.render yet")
     try:
@@ -188,13 +191,22 @@ def interior_of_panel(
     return inside[:: -1 if display.flip_y else 1, :: -1 if display.flip_x else 1]
 
 
-def assert_agree(found: np.ndarray, expected: np.ndarray, inside: np.ndarray) -> None:
-    """Colours within one level inside, and outside on all but 2 % of the samples; prints both shares."""
+def levels_of(engine: str, textured: bool) -> int:
+    """By how many of 255 levels an engine may differ inside: OpenGL promises little about how it filters textures."""
+    return 3 if engine == "gl" and textured else 1
+
+
+def assert_agree(found: np.ndarray, expected: np.ndarray, inside: np.ndarray, levels: int = 1) -> None:
+    """Colours within `levels` inside, and outside on all but 2 % of the samples; prints both shares.
+
+    More than one level is for 1 in 100 samples at most.
+    """
     difference = np.abs(found.astype(int) - expected)
     difference = difference.reshape(*inside.shape, -1).max(axis=-1)
     outside = (difference[~inside] > 1).sum() / inside.size
     print(f"interior {inside.mean():.1%}, of all samples {outside:.2%} differ on silhouettes")
     assert inside.mean() > 0.25, "too little is compared"
-    worst = np.argwhere(inside & (difference > 1))
+    assert (inside & (difference > 1)).mean() <= 0.01
+    worst = np.argwhere(inside & (difference > levels))
     assert len(worst) == 0, f"{len(worst)} interior samples differ by up to {difference[inside].max()}: {worst[:3]}"
     assert outside <= 0.02

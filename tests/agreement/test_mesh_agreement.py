@@ -19,6 +19,7 @@ from .helpers import (
     floor,
     interior_of_panel,
     interior_of_views,
+    levels_of,
     need,
     random_scene,
     smooth,
@@ -75,8 +76,12 @@ def assert_one_pass_is_many(scene, display, rig, engine, **options):
     one = views(scene, rig, engine, "single-pass", depth=True, **options)
     np.testing.assert_array_equal(one.color, many.color)
     np.testing.assert_array_equal(one.depth, many.depth)
-    woven = aus.interlace(many, display)
-    np.testing.assert_array_equal(panel(scene, display, rig, engine, **options), getattr(woven, "pixels", woven))
+    woven, found = aus.interlace(many, display).pixels, panel(scene, display, rig, engine, **options)
+    if engine == "gl":  # a single pass may meet triangles by rays: silhouettes and roundings may differ
+        assert (np.abs(found.astype(int) - woven) > 1).mean() <= 0.005
+        every = aus.Options(**options)
+        found = aus.render(scene, display, rig, method="instanced", engine=engine, options=every).pixels
+    np.testing.assert_array_equal(found, woven)
 
 
 # --- like the reference ------------------------------------------------------------------------------
@@ -94,7 +99,7 @@ def test_views_are_those_of_the_reference(engine, name, samples, shading, lighti
     expected = views(scene, rig, "reference", **options)
     found = views(scene, rig, engine, "single-pass", **options)
     inside = interior_of_views(scene, rig, SIZE, samples, by)
-    assert_agree(found.color, expected.color, inside)
+    assert_agree(found.color, expected.color, inside, levels_of(engine, name == "floor"))
     np.testing.assert_array_equal(np.isfinite(found.depth[inside]), np.isfinite(expected.depth[inside]))
     np.testing.assert_allclose(found.depth[inside], expected.depth[inside], rtol=2e-4)
 
@@ -128,7 +133,8 @@ def test_any_rig_agrees_with_the_reference(engine, rig):
 def test_textures_of_any_size_agree_with_the_reference(engine, texture):
     need(engine)
     expected, found = (views(floor(texture, 3), RIG, e, "single-pass") for e in ("reference", engine))
-    assert_agree(found.color, expected.color, interior_of_views(floor(), RIG, SIZE, 1, "object"))
+    inside = interior_of_views(floor(), RIG, SIZE, 1, "object")
+    assert_agree(found.color, expected.color, inside, levels_of(engine, True))
 
 
 @given(data=st.data())
@@ -141,7 +147,7 @@ def test_random_meshes_agree_with_the_reference(engine, data):
     expected, found = (views(scene, rig, e, "single-pass") for e in ("reference", engine))
     inside = interior_of_views(scene, rig, SIZE, 1, "triangle")
     difference = np.abs(found.color.astype(int) - expected.color).max(axis=-1)
-    assert difference[inside].max(initial=0) <= 1
+    assert difference[inside].max(initial=0) <= levels_of(engine, scene.objects[0].texture is not None)
 
 
 def test_of_equally_near_triangles_the_earlier_is_seen_as_in_the_reference(engine):
@@ -214,4 +220,9 @@ def test_continuous_panel_is_interlaced_from_the_cameras_it_asks_for(engine):
     stack = views(soup(), replace(RIG, offsets=tuple(offsets), views=len(offsets)), engine)
     rows, columns, channels = np.ogrid[:H, :W, :3]
     woven = stack.color[index.reshape(v.shape), rows, columns, channels]
-    np.testing.assert_array_equal(panel(soup(), display, RIG, engine), woven)
+    found = panel(soup(), display, RIG, engine)
+    if engine == "gl":  # views are rasterised, a continuous panel is not: silhouettes and roundings may differ
+        differs = np.abs(found.astype(int) - woven) > 1
+        assert differs.mean() <= 0.005
+    else:
+        np.testing.assert_array_equal(found, woven)

@@ -68,8 +68,8 @@ Continuous = Annotated[
 Background = Annotated[
     str | None, typer.Option("--background", metavar="COLOR", help="#rrggbb, R,G,B in 0…1, black, grey or white.")
 ]
-Method = Annotated[str, typer.Option("--method", help="single-pass, n-pass or n-pass-subres.")]
-EngineName = Annotated[str, typer.Option("--engine", help="auto, cpu or reference.")]
+Method = Annotated[str, typer.Option("--method", help="single-pass, n-pass or n-pass-subres; engine gl has more.")]
+EngineName = Annotated[str, typer.Option("--engine", help="auto, cpu, gl or reference.")]
 Shading = Annotated[str, typer.Option("--shading", help="exact, center or reuse.")]
 Lighting = Annotated[str, typer.Option("--lighting", help="sample or vertex.")]
 Sampling = Annotated[str, typer.Option("--sampling", help="pixel or subpixel.")]
@@ -254,7 +254,9 @@ def kernels_for(scene: Scene, panel: bool, options: Options) -> tuple[str, ...]:
 
 def announce_compilation(engine: str, *kernels: str) -> None:
     """Say so when this is the run that compiles these kernels."""
-    if engine not in ("auto", "cpu"):
+    from ..engines.engine import gpu_answers
+
+    if engine not in ("auto", "cpu") or (engine == "auto" and gpu_answers()):
         return
     from ..engines.cpu.jit import is_compiled
 

@@ -5,8 +5,10 @@ An engine knows arrays, camera offsets, a view map and a target. It knows neithe
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -55,6 +57,8 @@ class Draw:
     flip_x, flip_y : bool
         Panel only: the panel shows the picture mirrored.
     options : Options
+    method : str
+        How to draw, for engines that know several ways (`own_methods`).
     """
 
     camera: Camera
@@ -64,6 +68,7 @@ class Draw:
     flip_x: bool = False
     flip_y: bool = False
     options: Options = field(default_factory=Options)
+    method: str = "single-pass"
 
 
 @dataclass(eq=False)
@@ -85,7 +90,11 @@ class Target:
 
 
 class Engine(Protocol):
-    """A way to draw. `prepare` once per scene, `draw` once per frame and pass."""
+    """A way to draw. `prepare` once per scene, `draw` once per frame and pass.
+
+    An engine that carries out methods by itself, in one `draw`, names them in `own_methods` and is told which in
+    `Draw.method`; without that attribute it is "single-pass" alone, and the schedules of methods/ do the rest.
+    """
 
     name: str
 
@@ -126,15 +135,40 @@ def _reference() -> Engine:
     return ReferenceEngine()
 
 
-ENGINES: dict[str, Callable[[], Engine]] = {"cpu": _cpu, "reference": _reference}
+def _gl() -> Engine:
+    from .gl.engine import GlEngine
+
+    return GlEngine()
+
+
+ENGINES: dict[str, Callable[[], Engine]] = {"cpu": _cpu, "gl": _gl, "reference": _reference}
 
 _made: dict[str, Engine] = {}
 
 
-def get_engine(name: str) -> Engine:
-    """Return the engine called `name`; "auto" is the fastest there is."""
+@cache
+def gpu_answers() -> bool:
+    """Whether there is a GPU to draw with; without moderngl nothing is tried."""
+    if importlib.util.find_spec("moderngl") is None:
+        return False
+    from .gl.context import hardware_answers
+
+    return hardware_answers()
+
+
+def choose_engine(scene: Scene) -> str:
+    """The engine that "auto" means: gl where a GPU answers that can draw all of the scene, else cpu."""
+    if not gpu_answers():
+        return "cpu"
+    from .gl.engine import METHODS
+
+    return "gl" if all(type(item) in METHODS for item in scene.objects) else "cpu"
+
+
+def get_engine(name: str, scene: Scene | None = None) -> Engine:
+    """Return the engine called `name`; "auto" is the fastest there is, for the scene if one is given."""
     if name == "auto":
-        name = "cpu"
+        name = "cpu" if scene is None else choose_engine(scene)
     if name not in ENGINES:
         raise UnsupportedError(f"engine {name!r}: there are {', '.join(ENGINES)} and auto")
     if name not in _made:

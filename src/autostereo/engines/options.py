@@ -12,7 +12,7 @@ CHOICES: dict[str, tuple[object, ...]] = {
     "sampling": ("pixel", "subpixel"),
     "samples": (1, 4, 16, 64),
     "depth": (False, True),
-    "alpha": ("exact", "averaged"),
+    "alpha": ("exact", "averaged", "minimal"),
     "volume": ("shared", "exact"),
 }
 
@@ -34,8 +34,16 @@ class Options:
         Samples per pixel, on a regular grid.
     depth : bool
         Also return eye depth (view stacks only).
-    alpha, volume, step, views_per_pass, groups
-        For volumes, the OpenGL engine's geometry shader and splats.
+    alpha : {"exact", "averaged", "minimal"}
+        Panels in a single pass, for comparison with 2007's hardware, which had one opacity and one depth for the three
+        sub-pixels of a pixel (Hübner 2007b, section 3.6). "averaged": volumes' opacities, and the depths of triangles
+        and points drawn by covering quads, are the mean of the three; "minimal": those depths are the least.
+    volume, step
+        For volumes.
+    views_per_pass : int, optional
+        Method geometry-shader: views that one pass draws; None: as many as the device can.
+    groups : int
+        For splats on the OpenGL engine.
     """
 
     shading: str = "exact"

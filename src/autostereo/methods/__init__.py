@@ -1,4 +1,8 @@
-"""In which order: schedules of draws that work on any engine. METHODS lists every one."""
+"""In which order: schedules of draws that work on any engine. METHODS lists every one.
+
+An engine may carry out methods by itself, those here or others (`own_methods`): then one draw is all, and the engine is
+told the method's name.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +21,8 @@ METHODS: dict[str, ModuleType] = {
 
 def get_method(name: str, engine: Engine) -> ModuleType:
     """Return the schedule called `name`, which has draw_views and draw_panel, if `engine` can draw it."""
+    if name in getattr(engine, "own_methods", ()):
+        return single_pass
     if name not in METHODS or name not in engine.methods:
         raise UnsupportedError(f"method {name!r}: the {engine.name} engine has {', '.join(engine.methods)}")
     return METHODS[name]

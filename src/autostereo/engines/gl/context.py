@@ -1,0 +1,219 @@
+"""The one place that makes an OpenGL context, and lends it to one thread at a time.
+
+A context is current on one thread. `with device:` takes the device's lock and makes its context current, so that the
+public functions may be called from any thread; nothing else may touch moderngl objects. Objects that Python lets go of,
+on whatever thread, are released when the device is next entered.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+import threading
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from ...errors import AutostereoError, DependencyError, UnsupportedError
+
+if TYPE_CHECKING:
+    from .programs import Programs
+
+GL_VERSION = 400  # double precision in shaders, which view maps need (lib/viewmap.glsl)
+DEBIAN_PACKAGES = "libegl1 libgl1-mesa-dri libgl1"
+SOFTWARE = ("llvmpipe", "softpipe", "swiftshader", "software rasterizer")
+GPU_NODES = ("/dev/dri", "/dev/nvidiactl", "/dev/dxg", "/dev/mali0", "/dev/kgsl-3d0")  # one is there if a GPU is
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a device can hold: sides of textures in pixels and voxels, bytes of a buffer, invocations of a group."""
+
+    texture: int
+    texture_3d: int
+    buffer: int
+    uniform_block: int
+    draw_buffers: int
+    geometry_vertices: int
+
+
+@dataclass(eq=False)
+class Device:
+    """An OpenGL context with its limits and programs; `with device:` makes it current on this thread.
+
+    Attributes
+    ----------
+    ctx : moderngl.Context
+    version : int
+        430 is OpenGL 4.3.
+    renderer : str
+    uploaded : int
+        Bytes of scene data sent to the device so far.
+    """
+
+    ctx: Any
+    version: int
+    renderer: str
+    limits: Limits
+    uploaded: int = 0
+    _lock: Any = field(default_factory=threading.RLock)
+    _entered: int = 0
+
+    @property
+    def is_hardware(self) -> bool:
+        """Whether a GPU draws, and not the CPU in its stead."""
+        return not any(name in self.renderer.lower() for name in SOFTWARE)
+
+    @cached_property
+    def programs(self) -> Programs:
+        """Compiled shaders."""
+        from .programs import Programs
+
+        return Programs(self)
+
+    def __enter__(self) -> Device:
+        self._lock.acquire()
+        if self._entered == 0:
+            try:
+                self.ctx.__enter__()
+                self._release_forgotten()
+            except BaseException:
+                self._lock.release()
+                raise
+        self._entered += 1
+        return self
+
+    def _release_forgotten(self) -> None:
+        """Release what Python let go of; moderngl queues it (gc_mode), also what was released already."""
+        queue = self.ctx.objects
+        while queue:
+            item = queue.popleft()
+            if hasattr(item, "release"):
+                item.release()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._entered -= 1
+        try:
+            if self._entered == 0:
+                self.ctx.__exit__(kind, error, trace)
+        finally:
+            self._lock.release()
+
+    def require(self, version: int, what: str) -> None:
+        """Raise UnsupportedError unless the context has this OpenGL version (430 is 4.3)."""
+        if self.version < version:
+            raise UnsupportedError(
+                f"{what} needs OpenGL {_dotted(version)}, {self.renderer} has {_dotted(self.version)}: "
+                "update the graphics driver, or choose another method or engine='cpu'"
+            )
+
+    def check_texture(self, size: tuple[int, int], what: str) -> None:
+        """Raise UnsupportedError when a picture of size (width, height) is larger than a texture can be."""
+        if max(size) > self.limits.texture:
+            raise UnsupportedError(
+                f"{what} of {size[0]}×{size[1]} pixels is larger than a texture of this device, "
+                f"{self.limits.texture} pixels a side ({self.renderer}): choose a smaller size or engine='cpu'"
+            )
+
+    def upload(self, data: Any) -> Any:
+        """A buffer that holds an array of the scene; its bytes are counted."""
+        raw = data.tobytes()
+        if len(raw) > self.limits.buffer:
+            raise UnsupportedError(
+                f"a scene's array of {len(raw) / 1e6:.0f} MB is larger than a buffer of this device, "
+                f"{self.limits.buffer / 1e6:.0f} MB ({self.renderer}): split the object or choose engine='cpu'"
+            )
+        self.uploaded += len(raw)
+        return self.ctx.buffer(raw)
+
+
+def _dotted(version: int) -> str:
+    return f"{version // 100}.{version // 10 % 10}"
+
+
+_lock = threading.Lock()
+_made: Device | AutostereoError | None = None
+
+
+def get_device() -> Device:
+    """Return the process's device; made on the first call.
+
+    It is never given back: releasing a context ends the EGL display of all others in the process, too.
+
+    Raises
+    ------
+    DependencyError
+        moderngl or a driver is not installed.
+    UnsupportedError
+        The driver's OpenGL is too old.
+    """
+    global _made
+    with _lock:
+        if _made is None:
+            try:
+                _made = _make()
+            except AutostereoError as error:
+                _made = error
+    if isinstance(_made, AutostereoError):
+        raise type(_made)(*_made.args)
+    return _made
+
+
+def hardware_answers() -> bool:
+    """Whether a GPU can be drawn with. Where the system shows none, no context is tried for: that takes a moment."""
+    if sys.platform.startswith("linux") and not any(os.path.exists(node) for node in GPU_NODES):
+        return False
+    try:
+        return get_device().is_hardware
+    except AutostereoError:
+        return False
+
+
+def _make() -> Device:
+    try:
+        import moderngl
+    except ImportError:
+        raise DependencyError("engine gl needs moderngl: pip install autostereo[gl]") from None
+    linux = sys.platform.startswith("linux")
+    settings: dict[str, Any] = {"backend": "egl"} if linux else {}
+    try:
+        ctx = moderngl.create_context(standalone=True, require=330, **settings)
+    except Exception as error:  # moderngl and its backends raise plain exceptions
+        remedy = f"install a graphics driver, or Mesa's (Debian, Ubuntu: apt-get install {DEBIAN_PACKAGES})"
+        advice = remedy if linux else "install a graphics driver"
+        raise DependencyError(f"engine gl gets no OpenGL context ({_first_line(error)}): {advice}") from error
+    ctx.gc_mode = "context_gc"
+    info = ctx.info
+    limits = Limits(
+        texture=min(info["GL_MAX_TEXTURE_SIZE"], *info["GL_MAX_VIEWPORT_DIMS"]),
+        texture_3d=info["GL_MAX_3D_TEXTURE_SIZE"],
+        buffer=2**31 - 1,  # moderngl's sizes are ints
+        uniform_block=info["GL_MAX_UNIFORM_BLOCK_SIZE"],
+        draw_buffers=info["GL_MAX_DRAW_BUFFERS"],
+        geometry_vertices=info["GL_MAX_GEOMETRY_OUTPUT_VERTICES"],
+    )
+    device = Device(ctx, ctx.version_code, info["GL_RENDERER"], limits)
+    _release_current()
+    device.require(GL_VERSION, "engine gl")
+    return device
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]
+
+
+def _release_current() -> None:
+    """Let this thread go of its current context: contexts are made current, and only this thread could use it."""
+    if sys.platform == "win32":
+        ctypes.windll.opengl32.wglMakeCurrent(None, None)
+    elif sys.platform == "darwin":
+        ctypes.CDLL("/System/Library/Frameworks/OpenGL.framework/OpenGL").CGLSetCurrentContext(None)
+    else:
+        egl = ctypes.CDLL("libEGL.so.1")
+        egl.eglGetCurrentDisplay.restype = ctypes.c_void_p
+        egl.eglMakeCurrent.argtypes = [ctypes.c_void_p] * 4
+        egl.eglMakeCurrent(egl.eglGetCurrentDisplay(), None, None, None)

@@ -1,0 +1,245 @@
+"""A frame: atlas after atlas, pass after pass, sample after sample; then gathered, and read back once.
+
+How often the scene is traversed is all that the methods for views differ in (`passes`); they fill the same tiles of
+the same atlas through the same shaders, so that their pictures are the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import UnsupportedError
+from ..engine import Target
+from ..gathering import Tiles
+from .atlas import Atlas, Layout
+from .blocks import stored_background
+from .job import Job, Stage
+from .panel import ALL, Mean, Panel
+
+VIEW_PIXEL = 15e-9  # seconds of a CPU that drawing for it takes per pixel of an atlas, in any scene, measured
+CLEARLY = 0.7  # of the expected time: estimates err
+CHANNELS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def sample_positions(samples: int) -> list[tuple[float, float]]:
+    """Positions (x, y) of a pixel's samples within it, on a regular grid."""
+    side = round(samples**0.5)
+    return [((k % side + 0.5) / side, (k // side + 0.5) / side) for k in range(side * side)]
+
+
+def atlases(job: Job, name: str = "atlas") -> Iterator[Job]:
+    """The job for one atlas of views after the other, until all views have been in one; `name` keeps it."""
+    camera, views = job.draw.camera, len(job.draw.offsets)
+    layout = Layout.fitting(views, (camera.width, camera.height), job.device.limits)
+    atlas = job.kept.get(name, layout, lambda: Atlas(job.device, layout))
+    for first in range(0, views, layout.count):
+        yield job.with_atlas(atlas, first, min(layout.count, views - first))
+
+
+def passes(job: Job) -> Iterator[range]:
+    """The tiles that each traversal of the scene draws, of those in the atlas."""
+    method = job.draw.method
+    if method.startswith("n-pass"):
+        step = 1
+    elif method == "geometry-shader":
+        step = job.draw.options.views_per_pass or job.count
+    elif method == "geometry-shader-painter":
+        step = targets_per_pass(job)
+    else:
+        step = job.count
+    for start in range(0, job.count, step):
+        yield range(start, min(start + step, job.count))
+
+
+def targets_per_pass(job: Job) -> int:
+    """Views of a pass that has a render target for each (de Sorbier 2008, section 4.2: "limits … to eight")."""
+    most, asked = job.device.limits.draw_buffers, job.draw.options.views_per_pass
+    if asked is not None and min(asked, job.count) > most:
+        raise UnsupportedError(f"views_per_pass {asked}: this device has {most} render targets: choose fewer, or None")
+    return asked or most
+
+
+def draw_tiles(job: Job, stages: list[Stage], channels: tuple[float, ...] | None = None) -> None:
+    """Clear the atlas and draw its views into it.
+
+    channels: of a panel, those that are to be gathered: what the mask hides of them need not be drawn.
+    """
+    whole = channels == ALL and job.count == len(job.draw.offsets)  # else masks change within a frame
+    if whole and job.draw.method == "single-pass":
+        _start_masked(job)
+    else:
+        job.atlas.clear(stored_background(job.scene))
+    for tiles in passes(job):
+        if channels is not None and job.draw.method == "n-pass-masked":
+            _hide(job, tiles, channels)
+        for stage in stages:
+            stage.draw_views(job, tiles)
+
+
+def _start_masked(job: Job) -> None:
+    """An empty atlas with all that the mask hides already hidden: made once, then copied in every frame."""
+
+    def masked() -> Atlas:
+        part = replace(job, atlas=Atlas(job.device, job.atlas.layout))
+        part.atlas.clear(stored_background(job.scene))
+        _hide(part, range(part.count), ALL)
+        return part.atlas
+
+    key = job.atlas.layout, job.draw.viewmap, job.draw.flip_x, job.draw.flip_y
+    job.device.ctx.copy_framebuffer(job.atlas.target, job.kept.get("masked", key, masked).target)
+
+
+def _hide(job: Job, tiles: range, channels: tuple[float, ...]) -> None:
+    """Bring the depth of pixels that show nothing of a tile's view to the front (Hübner 2007a, section 4, early z)."""
+    ctx = job.device.ctx
+    program = job.masked_program("tile.vert", "hide.frag")
+    program["first_view"], program["first_held"], program["channels"] = tiles.start, job.first, channels
+    job.atlas.target.color_mask = (False,) * 4
+    job.atlas.target.use()
+    ctx.enable_only(ctx.DEPTH_TEST)
+    job.vertex_array(program, []).render(ctx.TRIANGLE_STRIP, vertices=4, instances=len(tiles))
+    job.atlas.target.color_mask = (True,) * 4
+
+
+# --- views ---------------------------------------------------------------------------------------------------
+
+
+def draw_views(job: Job, stages: list[Stage], target: Target) -> None:
+    """Draw a stack of views, as many at a time as an atlas may hold."""
+    for part in atlases(job):
+        _draw_samples(part, stages, target.depth)
+        for tile in range(part.count):
+            part.atlas.read_color(tile, target.color[part.first + tile])
+
+
+def _draw_samples(job: Job, stages: list[Stage], depth: NDArray[np.float32] | None = None) -> None:
+    """Fill an atlas with the mean colours of all samples, and `depth` (V, H, W) with the nearest depths."""
+    samples, size = sample_positions(job.draw.options.samples), job.atlas.layout.size
+    mean = job.kept.get("mean", size, lambda: Mean(job.device, size)) if samples[1:] else None
+    if mean is not None:
+        mean.clear()
+    for x, y in samples:
+        job.write_frame(replace(job.draw.camera, shift=(0.5 - x, 0.5 - y)))
+        draw_tiles(job, stages)
+        if mean is not None:
+            mean.add(job, job.atlas.color)
+        if depth is not None:
+            for tile, view in enumerate(range(job.first, job.first + job.count)):
+                found = job.depths.depth_from_window(job.atlas.read_depth(tile))
+                depth[view] = found if (x, y) == samples[0] else np.minimum(depth[view], found)
+    if mean is not None:
+        mean.write(job, job.atlas.over)
+
+
+# --- panels --------------------------------------------------------------------------------------------------
+
+
+def by_channels(job: Job, stages: list[Stage]) -> bool:
+    """Whether the panel's sub-pixels are drawn for their own cameras, and not views.
+
+    In a single pass: where cameras lie between views, and where it is expected to be clearly faster, as where few
+    triangles are seen by many views.
+    """
+    draw = job.draw
+    assert draw.viewmap is not None
+    if draw.method != "single-pass":
+        return draw.method == "covering-quad"
+    if draw.viewmap.continuous or not stages:
+        return True
+    views = VIEW_PIXEL * len(draw.offsets) * draw.camera.width * draw.camera.height
+    costs = [stage.costs(job) for stage in stages]
+    return sum(channels for _, channels in costs) < CLEARLY * (views + sum(own for own, _ in costs))
+
+
+def draw_panel(job: Job, stages: list[Stage], target: Target) -> None:
+    """Draw a panel: tiles of views or of channels, gathered by the mask, and what is drawn over that."""
+    camera = job.draw.camera
+    size = camera.width, camera.height
+    over = [stage for stage in stages if stage.draws_over(job)]
+    under = [stage for stage in stages if stage not in over]
+    panel = job.kept.get("panel", (size, bool(over)), lambda: Panel(job.device, size, bool(over)))
+    if job.draw.method == "n-pass-subres":
+        _weave_small(job, stages, panel)
+        panel.read(target.color)
+        return
+    samples = sample_positions(job.draw.options.samples)
+    mean = job.kept.get("panel mean", size, lambda: Mean(job.device, size)) if samples[1:] else None
+    if mean is not None:
+        mean.clear()
+    gather = _gather_channels if by_channels(job, under) else _gather_views
+    for sample in samples:
+        panel.clear()
+        gather(job, under, panel, sample)
+        for stage in over:
+            stage.draw_panel(job, panel)
+        if mean is not None:
+            mean.add(job, panel.color)
+    if mean is not None:
+        mean.write(job, panel.target)
+    panel.read(target.color)
+
+
+def _gather_views(job: Job, stages: list[Stage], panel: Panel, sample: tuple[float, float]) -> None:
+    """Draw views and gather them; where sub-pixels are sampled at their own centres, a channel at a time."""
+    x, y = sample
+    own = job.draw.options.sampling == "subpixel"
+    for column, channels in [((c + x) / 3, CHANNELS[c]) for c in range(3)] if own else [(x, ALL)]:
+        job.write_frame(replace(job.draw.camera, shift=(0.5 - column, 0.5 - y)))
+        for part in atlases(job):
+            draw_tiles(part, stages, channels)
+            panel.gather(part, channels)
+
+
+def _gather_channels(job: Job, stages: list[Stage], panel: Panel, sample: tuple[float, float]) -> None:
+    """Draw the sub-pixels of each channel into a tile of their own, and gather them."""
+    x, y = sample
+    own = job.draw.options.sampling == "subpixel"
+    job.write_frame(job.draw.camera)
+    tiles = 3 if job.draw.options.alpha == "exact" else 1  # one depth for all three channels
+    layout = Layout.fitting(tiles, panel.size, job.device.limits)
+    atlas = job.kept.get("channels", layout, lambda: Atlas(job.device, layout))
+    columns = tuple((c + x) / 3 if own else x for c in range(3))
+    for first in range(0, tiles, layout.count):
+        part = job.with_atlas(atlas, first, min(layout.count, tiles - first), (columns, y))
+        atlas.clear(stored_background(job.scene))
+        for stage in stages:
+            stage.draw_channels(part)
+        panel.gather(part)
+
+
+def _weave_small(job: Job, stages: list[Stage], panel: Panel) -> None:
+    """Small views, scaled up while they are woven (Hübner 2007a, section 2.3), as methods/n_pass_subres.py has it."""
+    camera, views = job.draw.camera, len(job.draw.offsets)
+    width, height = (max(1, round(side / views**0.5)) for side in panel.size)
+    small = replace(
+        camera, width=width, height=height, fx=camera.fx * width / camera.width, fy=camera.fy * height / camera.height
+    )
+    parts = list(atlases(replace(job, draw=replace(job.draw, camera=small)), "small atlas"))
+    if len(parts) > 1:
+        raise UnsupportedError(
+            f"method 'n-pass-subres': {views} views of {width}×{height} pixels are more than one atlas of this device "
+            f"holds ({parts[0].count}): choose fewer views, n-pass or single-pass"
+        )
+    _draw_samples(parts[0], stages)
+    layout = parts[0].atlas.layout
+    panel.weave(job, parts[0].atlas.color, Tiles(layout.columns, width, height, *layout.size, 4))
+
+
+def interlace(job: Job, views: NDArray[np.uint8], first: int) -> Panel:
+    """Gather a panel of pictures (n, H, W, 3 or 4) of the views from `first` on."""
+    count, height, width, channels = views.shape
+    layout = Layout.fitting(count, (width, height), job.device.limits)
+    atlas, panel = Atlas(job.device, layout), Panel(job.device, (width, height))
+    panel.clear()
+    for start in range(0, count, layout.count):
+        held = views[start : start + layout.count]
+        for picture, (x, y) in zip(held, layout.tiles, strict=False):
+            rgba = np.full((height, width, 4), 255, np.uint8)
+            rgba[..., :channels] = picture
+            atlas.color.write(rgba, (int(x), int(y), width, height))
+        panel.gather(job.with_atlas(atlas, first + start, len(held)))
+    return panel
