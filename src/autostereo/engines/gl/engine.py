@@ -118,7 +118,8 @@ class GlEngine:
                     continue
                 stage, before = next(old), [item for item in prepared.scene.objects if type(item) is kind]
                 if any(a is not b for a, b in zip(objects, before, strict=True)):
-                    stage = stage.follow(objects) if hasattr(stage, "follow") else make(device, objects, prepared.middle)
+                    follow = getattr(stage, "follow", None)
+                    stage = follow(objects) if follow else make(device, objects, prepared.middle)
                 stages.append(stage)
             return replace(prepared, scene=scene, stages=stages)
 
