@@ -28,7 +28,8 @@ from .atlas import Layout
 from .context import Device
 from .job import Job, Stage
 from .panel import Panel
-from .points_buffers import CONSTANTS, SurfelBuffers, set_lights
+from .points_buffers import CONSTANTS, SurfelBuffers, give_draw
+from .points_groups import number_of_groups, sum_groups
 from .programs import Defines
 
 SHEET_PIXELS = 2**22  # of a sheet: with all its sums a third of a gigabyte for panels
@@ -57,6 +58,7 @@ class Sheet:
         self.nearest_target = ctx.framebuffer([self.nearest], depth)
         self.sums_target = ctx.framebuffer([self.sums, self.weights] if panel else [self.sums], depth)
         self.offsets_target = ctx.framebuffer([self.offsets]) if panel else None
+        self.all_target = ctx.framebuffer([self.nearest, self.sums, self.weights]) if panel else None
         self.stops_target = ctx.framebuffer([self.stops], depth) if stopped else None
 
     def give(self, program: Any) -> None:
@@ -124,7 +126,8 @@ class PointClouds(Stage):
         """Draw all sub-pixels of a panel, band after band."""
         self._buffers.make_ready(job)
         width, height = panel.size
-        rows = max(1, min(height, SHEET_PIXELS // width))
+        groups = number_of_groups(job, self._buffers)
+        rows = max(1, min(height, SHEET_PIXELS // (width * max(groups, 1))))
         stopped = has_others(job)
         sheet = self._sheet(job, (width, rows), True, stopped)
         for first in range(0, height, rows):
@@ -132,7 +135,10 @@ class PointClouds(Stage):
             self._find_offsets(job, part)
             if stopped:
                 self._stop(job, part, panel.depth)
-            self._sum(job, part)
+            if groups:
+                sum_groups(job, self._buffers, sheet, part.place, groups)
+            else:
+                self._sum(job, part)
             self._put(job, part, panel)
 
     def _sheet(self, job: Job, size: tuple[int, int], panel: bool, stopped: bool) -> Sheet:
@@ -185,15 +191,9 @@ class PointClouds(Stage):
         defines = {**defines, **self._buffers.switches(job), "PANEL": sheet.panel, "STOPPED": sheet.stopped}
         program = job.program("points.vert", "points.frag", defines=defines, version=430)
         sheet.give(program)
-        program["sheet"] = part.place
-        columns = job.columns or (0.5, 0.5, 0.5)
-        program["sample_range"] = min(columns), max(columns), job.row, job.row
-        for name, value in (("reach", job.draw.culling), ("columns", columns), ("row", job.row)):
-            if name in program:
-                program[name] = value
+        give_draw(program, job, part.place)
         if "first_view" in program:
             program["first_view"] = part.first
-        set_lights(program, job)
         quads = job.vertex_array(program, [], self._buffers.quads)
         quads.render(vertices=6 * self._buffers.count, instances=part.count)
 

@@ -84,6 +84,19 @@ class SurfelBuffers:
         return True
 
 
+def give_draw(program: Any, job: Job, place: tuple[float, ...]) -> None:
+    """Give a program of points.vert where it draws, `place` as points.Part has it, and what shaders need to know."""
+    columns = job.columns or (0.5, 0.5, 0.5)
+    given = {
+        "sheet": place, "sample_range": (min(columns), max(columns), job.row, job.row), "reach": job.draw.culling,
+        "columns": columns, "row": job.row,
+    }  # fmt: skip
+    for name, value in given.items():
+        if name in program:
+            program[name] = value
+    set_lights(program, job)
+
+
 def set_lights(program: Any, job: Job) -> None:
     """Give the scene's lights to a program that includes lib/shading.glsl."""
     lights = lights_in_eye_space(job.scene.lights, job.draw.camera)

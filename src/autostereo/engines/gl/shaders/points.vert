@@ -1,5 +1,6 @@
 // Covering quads of surfels: around the projections for all cameras (PANEL; Huebner 2007b, section 3.2, DESIGN erratum
-// 2), or for that of a view; every instance is one more view. Four vertices per surfel.
+// 2), or for that of a view; every instance is one more view. Four vertices per surfel. Switch: GROUPS, their number:
+// surfels take turns in groups, each drawn to a tile of its own.
 #include "lib/frame.glsl"
 #include "lib/views.glsl"
 #include "lib/shading.glsl"
@@ -7,7 +8,7 @@
 
 layout(std430, binding = 1) readonly buffer Surfels { Surfel surfels[]; };
 
-uniform vec4 sheet;         // width, height of what is drawn on; columns of tiles on it, or the first row of a band
+uniform vec4 sheet;         // size of what is drawn on; columns of tiles, or the first row of a band; columns of groups
 uniform vec4 sample_range;  // least and greatest position, in x and in y, at which pixels are sampled
 
 flat out vec4 place;        // see lib/surfels.glsl
@@ -35,9 +36,16 @@ void main() {
 #ifdef PANEL
     vec2 left = picture_times_depth(place.xyz, reach.x) / place.z, right = picture_times_depth(place.xyz, reach.y) / place.z;
     vec2 size = window.xy, origin = vec2(0.0, -sheet.z);
+#ifdef GROUPS
+    int group = (gl_VertexID >> 2) % GROUPS, group_columns = int(sheet.w);
+    origin += vec2(group % group_columns, group / group_columns) * sheet.xy;
+    vec2 target = sheet.xy * vec2(group_columns, (GROUPS + group_columns - 1) / group_columns);
+#else
+    vec2 target = sheet.xy;
+#endif
 #else
     vec4 view = views[first_view + gl_InstanceID];
-    vec2 left = picture_times_depth(place.xyz, view.x) / place.z, right = left, size = atlas_size.zw;
+    vec2 left = picture_times_depth(place.xyz, view.x) / place.z, right = left, size = atlas_size.zw, target = sheet.xy;
     int columns = int(sheet.z);
     origin = vec2(gl_InstanceID % columns, gl_InstanceID / columns) * size;
     camera_offset = view.x;
@@ -63,5 +71,5 @@ void main() {
     float nearest = max(place.z - place.w * sqrt(max(1.0 - normal.z * normal.z, 0.0)), depth_range.z);
     z = max(2.0 * window_from_depth(nearest) - 1.0, -1.0);
 #endif
-    gl_Position = vec4(2.0 * (corner + origin) / sheet.xy - 1.0, z, 1.0);
+    gl_Position = vec4(2.0 * (corner + origin) / target - 1.0, z, 1.0);
 }
