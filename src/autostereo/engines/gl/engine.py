@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 
 from ...errors import UnsupportedError
 from ...scene.mesh import Mesh
+from ...scene.points import Points
 from ...scene.scene import Scene
 from ..engine import Draw, Target
 from ..gathering import check_interlace, quilt_tiles
@@ -44,13 +45,15 @@ from .context import Device, get_device
 from .job import Job, Kept
 from .mesh import Meshes
 from .panel import Panel
+from .points import PointClouds
 
-STAGES: tuple[tuple[type, type[Any]], ...] = ((Mesh, Meshes),)
+STAGES: tuple[tuple[type, type[Any]], ...] = ((Mesh, Meshes), (Points, PointClouds))
 METHODS: dict[type, tuple[str, ...]] = {
     Mesh: (
         *("single-pass", "n-pass", "n-pass-subres", "n-pass-masked"),
         *("instanced", "geometry-shader", "geometry-shader-painter", "covering-quad"),
     ),
+    Points: ("single-pass", "n-pass", "n-pass-subres", "n-pass-masked", "instanced", "covering-quad"),
 }
 PANELS_ONLY = ("n-pass-subres", "n-pass-masked", "covering-quad")
 

@@ -172,15 +172,26 @@ def draw_panel(job: Job, stages: list[Stage], target: Target) -> None:
         mean.clear()
     gather = _gather_channels if by_channels(job, under) else _gather_views
     for sample in samples:
-        panel.clear()
-        gather(job, under, panel, sample)
+        if under or not over:
+            panel.clear()
+            gather(job, under, panel, sample)
+        else:
+            panel.fill(stored_background(job.scene))
         for stage in over:
-            stage.draw_panel(job, panel)
+            job.write_frame(camera)
+            stage.draw_panel(positioned(job, sample), panel)
         if mean is not None:
             mean.add(job, panel.color)
     if mean is not None:
         mean.write(job, panel.target)
     panel.read(target.color)
+
+
+def positioned(job: Job, sample: tuple[float, float]) -> Job:
+    """The job for what is drawn by channels, told where in a pixel they are sampled."""
+    own = job.draw.options.sampling == "subpixel"
+    columns = tuple((c + sample[0]) / 3 if own else sample[0] for c in range(3))
+    return replace(job, columns=columns, row=sample[1])
 
 
 def _gather_views(job: Job, stages: list[Stage], panel: Panel, sample: tuple[float, float]) -> None:
@@ -196,15 +207,13 @@ def _gather_views(job: Job, stages: list[Stage], panel: Panel, sample: tuple[flo
 
 def _gather_channels(job: Job, stages: list[Stage], panel: Panel, sample: tuple[float, float]) -> None:
     """Draw the sub-pixels of each channel into a tile of their own, and gather them."""
-    x, y = sample
-    own = job.draw.options.sampling == "subpixel"
+    place = positioned(job, sample)
     job.write_frame(job.draw.camera)
     tiles = 3 if job.draw.options.alpha == "exact" else 1  # one depth for all three channels
     layout = Layout.fitting(tiles, panel.size, job.device.limits)
     atlas = job.kept.get("channels", layout, lambda: Atlas(job.device, layout))
-    columns = tuple((c + x) / 3 if own else x for c in range(3))
     for first in range(0, tiles, layout.count):
-        part = job.with_atlas(atlas, first, min(layout.count, tiles - first), (columns, y))
+        part = job.with_atlas(atlas, first, min(layout.count, tiles - first), (place.columns, place.row))
         atlas.clear(stored_background(job.scene))
         for stage in stages:
             stage.draw_channels(part)

@@ -25,8 +25,8 @@ class Panel:
         RGBA, 8 bits; row 0 is the top.
     depth : moderngl.Texture, optional
         Depth-buffer values (lib/frame.glsl) of each channel, float32; made when the panel is asked `with_depth`.
-    target : moderngl.Framebuffer
-        Of `color` alone.
+    target, both : moderngl.Framebuffer
+        Of `color` alone, and with `depth` if there is one.
     """
 
     def __init__(self, device: Device, size: tuple[int, int], with_depth: bool = False) -> None:
@@ -39,11 +39,16 @@ class Panel:
             if texture is not None:
                 texture.filter = (ctx.NEAREST, ctx.NEAREST)
         self.target = ctx.framebuffer([self.color])
-        self._both = self.target if self.depth is None else ctx.framebuffer([self.color, self.depth])
+        self.both = self.target if self.depth is None else ctx.framebuffer([self.color, self.depth])
 
     def clear(self) -> None:
         """Nothing gathered yet."""
-        self._both.clear()
+        self.both.clear()
+
+    def fill(self, background: NDArray[np.float64]) -> None:
+        """Everything infinitely far, in the background's colour: for what is drawn over a panel with depth."""
+        self.both.clear(1.0, 1.0, 1.0, 1.0)
+        self.target.clear(*background, 1.0)
 
     def gather(self, job: Job, channels: tuple[float, ...] = ALL) -> None:
         """Add those sub-pixels of `channels` (three of 0 and 1) that the job's atlas holds."""
@@ -58,7 +63,7 @@ class Panel:
             job.atlas.depth.use(1)
             program["atlas_depth"] = 1
         program["held"], program["channels"] = (job.first, job.count), channels
-        self._both.use()
+        self.both.use()
         ctx.enable_only(ctx.BLEND)
         ctx.blend_func = ctx.ONE, ctx.ONE
         job.cover(program)
