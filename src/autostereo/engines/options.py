@@ -14,6 +14,7 @@ CHOICES: dict[str, tuple[object, ...]] = {
     "depth": (False, True),
     "alpha": ("exact", "averaged", "minimal"),
     "volume": ("shared", "exact"),
+    "proxy": ("march", "slices"),
 }
 
 
@@ -56,6 +57,7 @@ class Options:
     step: float = 1.0
     views_per_pass: int | None = None
     groups: int = 8
+    proxy: str = "march"
 
     def __post_init__(self) -> None:
         for name, choices in CHOICES.items():

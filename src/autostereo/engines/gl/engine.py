@@ -37,6 +37,7 @@ from ...errors import UnsupportedError
 from ...scene.mesh import Mesh
 from ...scene.points import Points
 from ...scene.scene import Scene
+from ...scene.volume import Volume
 from ..engine import Draw, Target
 from ..gathering import check_interlace, quilt_tiles
 from . import frames
@@ -46,14 +47,21 @@ from .job import Job, Kept
 from .mesh import Meshes
 from .panel import Panel
 from .points import PointClouds
+from .volume import Isosurfaces, Volumes
 
-STAGES: tuple[tuple[type, type[Any]], ...] = ((Mesh, Meshes), (Points, PointClouds))
+STAGES: tuple[tuple[type, type[Any]], ...] = (
+    (Mesh, Meshes),
+    (Volume, Isosurfaces),
+    (Points, PointClouds),
+    (Volume, Volumes),
+)
 METHODS: dict[type, tuple[str, ...]] = {
     Mesh: (
         *("single-pass", "n-pass", "n-pass-subres", "n-pass-masked"),
         *("instanced", "geometry-shader", "geometry-shader-painter", "covering-quad"),
     ),
     Points: ("single-pass", "n-pass", "n-pass-subres", "n-pass-masked", "instanced", "covering-quad"),
+    Volume: ("single-pass", "n-pass", "n-pass-subres", "n-pass-masked", "covering-quad"),
 }
 PANELS_ONLY = ("n-pass-subres", "n-pass-masked", "covering-quad")
 

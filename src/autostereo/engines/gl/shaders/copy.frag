@@ -1,7 +1,9 @@
-// A picture into a tile.
-uniform sampler2D picture;
-uniform ivec2 first_pixel;  // of the tile
-out vec4 color;
+// A picture and its depths, to be read while they are drawn over.
+uniform sampler2D picture, depths;
+layout(location = 0) out vec4 color;
+layout(location = 1) out vec4 depth;
 void main() {
-    color = texelFetch(picture, ivec2(gl_FragCoord.xy) - first_pixel, 0);
+    ivec2 at = ivec2(gl_FragCoord.xy);
+    color = texelFetch(picture, at, 0);
+    depth = texelFetch(depths, at, 0);
 }

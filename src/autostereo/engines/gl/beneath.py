@@ -1,0 +1,59 @@
+"""What was drawn before something translucent: a copy of colours and depths, to be read while they are drawn over."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .context import Device
+from .job import Job
+from .panel import Panel
+
+
+class Beneath:
+    """Colours, and depths as in lib/frame.glsl: of a panel one per channel."""
+
+    def __init__(self, device: Device, size: tuple[int, int], channels: int) -> None:
+        ctx = device.ctx
+        self._color = ctx.texture(size, 4)
+        self._depth = ctx.texture(size, channels, dtype="f4")
+        for texture in (self._color, self._depth):
+            texture.filter = (ctx.NEAREST, ctx.NEAREST)
+        self._target = ctx.framebuffer([self._color, self._depth])
+
+    @staticmethod
+    def of_tiles(job: Job, tiles: range) -> Beneath:
+        """Copy some tiles of the job's atlas, to the same places."""
+        layout = job.atlas.layout
+        kept: Beneath = job.kept.get("beneath tiles", layout, lambda: Beneath(job.device, layout.size, 1))
+        for tile in tiles:
+            x, y = layout.tiles[tile]
+            kept._copy(job, (job.atlas.color, job.atlas.depth), (int(x), int(y), layout.width, layout.height))
+        return kept
+
+    @staticmethod
+    def of_panel(job: Job, panel: Panel) -> Beneath:
+        """Copy a panel that has depths."""
+        kept: Beneath = job.kept.get("beneath panel", panel.size, lambda: Beneath(job.device, panel.size, 4))
+        kept._copy(job, (panel.color, panel.depth), (0, 0, *panel.size))
+        return kept
+
+    def _copy(self, job: Job, textures: tuple[Any, Any], box: tuple[int, int, int, int]) -> None:
+        ctx = job.device.ctx
+        program = job.program("screen.vert", "copy.frag")
+        for unit, (name, texture) in enumerate(zip(("picture", "depths"), textures, strict=True)):
+            texture.use(unit)
+            program[name] = unit
+        self._target.viewport = box
+        self._target.use()
+        ctx.enable_only(ctx.NOTHING)
+        job.cover(program)
+
+    def use(self, program: Any, color_unit: int, depth_unit: int) -> None:
+        """Give them to a program that includes lib/volume_target.glsl."""
+        for name, texture, unit in (
+            ("color_before", self._color, color_unit),
+            ("depth_before", self._depth, depth_unit),
+        ):
+            if name in program:
+                texture.use(unit)
+                program[name] = unit

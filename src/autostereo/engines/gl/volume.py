@@ -1,0 +1,215 @@
+"""Volumes on the gl engine: rays through the tiles of views, or through the sub-pixels of a panel in one pass.
+
+The methods of Hübner 2007a: `n-pass` and its kin follow a ray per pixel of every view; `single-pass` and `covering-quad`
+follow the rays of a panel's sub-pixels, each from its own eye, over what was gathered before. Rays march in the
+fragment shader (volume.frag), or slices are blended (`Options.proxy`, volume_slices.py).
+
+What the three rays of a pixel share: the search for what is empty, and the end of the march; with `volume="shared"`,
+where they pass within 2·NEAR voxels of each other, lookups too: what a ray is told then is the volume at most NEAR
+voxels beside it, so a scalar is off by no more than NEAR·|∂s/∂x| (per voxel). Displays that show one view in all
+of a pixel need one ray a pixel. With `volume="exact"` only equal rays share, and slabs are lit in their middle.
+
+Order of a scene: isosurfaces are opaque and come before points; then volumes that compose, all at once; then those of the
+greatest value one by one (engines/reference/picture.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import UnsupportedError
+from ...scene.mesh import Mesh
+from ...scene.points import Points
+from ...scene.volume import Volume
+from ...viewmap import ViewMap
+from ..reference.shading import lights_in_eye_space
+from .atlas import Atlas
+from .beneath import Beneath
+from .context import Device
+from .job import Job, Stage
+from .panel import Panel
+from .programs import Defines
+from .volume_data import Look, float_texture, is_shaded, place_in, send, slab_table, table_range
+from .volume_slices import draw_slices
+from .volume_space import Slices, most_half_spaces, placing, put, put_units
+
+TOGETHER = 4  # volumes that compose in one march: each takes three of the 16 texture units that there are at least
+NEAR = 0.25  # voxels that a shared lookup may be beside a ray
+LENGTHS = 8  # lengths of slabs per doubling, for which tables are made
+FRAGMENTS = {"composite": "volume.frag", "mip": "volume_most.frag", "iso": "volume_iso.frag"}
+VOXELS, EMPTY, TABLES, COLOR_BEFORE, DEPTH_BEFORE = 0, 4, 8, 12, 13  # texture units
+
+
+class Rays(Stage):
+    """Volumes whose rays are followed; what isosurfaces and other volumes have in common."""
+
+    def __init__(self, device: Device, volumes: Sequence[Volume], middle: NDArray[np.float64]) -> None:
+        mine = [v for v in volumes if (v.mode == "iso") == self.opaque]
+        self._all = list(volumes)
+        self._voxels = {id(v): send(device, v) for v in mine}
+        self._looks = {id(v): Look(device, v, self._voxels[id(v)]) for v in mine}
+        compose = [v for v in mine if v.mode == "composite"]
+        if len(compose) > TOGETHER:
+            raise UnsupportedError(
+                f"engine gl: {len(compose)} volumes of mode 'composite', at most {TOGETHER} can be drawn together: "
+                "merge some of them, or choose engine='cpu'"
+            )
+        self._groups = ([compose] if compose else []) + [[v] for v in mine if v.mode != "composite"]
+
+    opaque = False
+
+    def draws_over(self, job: Job) -> bool:
+        """On panels in one pass: rays need no tiles."""
+        return job.draw.method in ("single-pass", "covering-quad")
+
+    def draw_views(self, job: Job, tiles: range) -> None:
+        """Draw the views of these tiles."""
+        slices = self._slices(job)
+        for number, group in enumerate(self._groups if slices else []):
+            beneath = None
+            if not self.opaque and (number > 0 or has_opaque(job)):
+                beneath = Beneath.of_tiles(job, tiles)
+            program = self._program(job, group, slices, beneath)
+            program["first_view"] = tiles.start
+            write_depth = self.opaque or job.draw.options.depth
+            render(job, program, job.atlas.target, write_depth, len(tiles))
+
+    def draw_panel(self, job: Job, panel: Panel) -> None:
+        """Draw the sub-pixels of a panel."""
+        slices = self._slices(job)
+        for number, group in enumerate(self._groups if slices else []):
+            beneath = Beneath.of_panel(job, panel) if number > 0 or has_opaque(job) else None
+            target = panel.both if self.opaque else panel.target
+            program = self._program(job, group, slices, beneath)
+            put(program, columns=job.columns, sample_row=job.row, reach=job.draw.culling)
+            render(job, program, target)
+
+    def _slices(self, job: Job) -> Slices | None:
+        return Slices.through(self._all, job.draw.camera, job.draw.options.step)
+
+    def _program(self, job: Job, group: list[Volume], slices: Slices | None, beneath: Beneath | None) -> Any:
+        """The program of a group, told all about the frame."""
+        assert slices is not None
+        on_panel, mode = job.columns is not None, group[0].mode
+        defines: Defines = {
+            **self._switches(job, group),
+            "PANEL": on_panel,
+            "LANES": 1 if not on_panel or one_ray(job) else 3,
+            "OPAQUE": beneath is not None and has_opaque(job),
+            "COVERED": beneath is not None,
+            "AVERAGED": on_panel and job.draw.options.alpha == "averaged",
+            "HALF_DEPTH": not on_panel and job.draw.options.depth,
+        }
+        make = job.masked_program if on_panel else job.program
+        program = make("volume.vert", FRAGMENTS[mode], defines=defines)
+        self._tell(program, job, group, slices)
+        put(program, background=job.scene.background)
+        if beneath is not None:
+            beneath.use(program, COLOR_BEFORE, DEPTH_BEFORE)
+        return program
+
+    def _switches(self, job: Job, group: list[Volume]) -> Defines:
+        """The switches of lib/volume.glsl and lib/volume_light.glsl."""
+        lights = lights_in_eye_space(job.scene.lights, job.draw.camera)
+        shaded = any(is_shaded(v) for v in group)
+        shiny = shaded and any(v.material.specular > 0 for v in group)
+        return {
+            "VOLUMES": len(group),
+            "HALVES": most_half_spaces(group),
+            "SHADED": shaded,
+            "GRADIENTS": shaded and job.draw.options.volume == "shared" and group[0].mode == "composite",
+            "LIGHTS": len(lights) if shaded else 0,
+            "SHINY": shiny,
+            "PLACED": shiny or any(place[3] != 0 for place, _ in lights),
+            "OWN_EYES": self._own_eyes(job),
+        }
+
+    def _own_eyes(self, job: Job) -> bool:
+        options = job.draw.options
+        return options.shading != "center" and (self.opaque or options.volume == "exact")
+
+    def _tell(self, program: Any, job: Job, group: list[Volume], slices: Slices) -> None:
+        """Fill the uniforms of a group."""
+        voxels, looks = ([held[id(v)] for v in group] for held in (self._voxels, self._looks))
+        for k in range(len(group)):
+            voxels[k].texture.use(VOXELS + k)
+            looks[k].emptiness.use(EMPTY + k)
+        count = range(len(group))
+        put_units(program, voxels=[VOXELS + k for k in count], emptiness=[EMPTY + k for k in count])
+        shared = job.draw.options.volume == "shared" and not self.opaque
+        put(program, slices=(slices.first, slices.distance, slices.slabs), share_within=NEAR if shared else -1.0)
+        put(program, **placing(group, job.draw.camera))
+        materials = [v.material for v in group]
+        lit = [(m.ambient, m.diffuse, m.specular, m.shininess) for m in materials]
+        unlit = (1.0, 0.0, 0.0, 0.0)
+        put(program, volume_material=[m if is_shaded(v) else unlit for v, m in zip(group, lit, strict=True)])
+        lights = lights_in_eye_space(job.scene.lights, job.draw.camera)
+        put(program, light_place=[p for p, _ in lights], light_color=[c for _, c in lights])
+        volume = group[0]
+        if volume.mode == "composite":
+            self._tell_tables(program, job, group, slices)
+        elif volume.mode == "mip":
+            looks[0].colors.use(TABLES)
+            put_units(program, most_colors=TABLES)
+            put(program, most_place=place_in((0.0, 1.0), (0.0, 1.0), looks[0].colors.width))
+        else:
+            (low, high), iso = volume.value_range, volume.iso
+            assert iso is not None
+            level = (iso - low) / max(high - low, 1e-300)
+            put(program, level=level, own_color=volume.transfer.evaluate(iso)[:3])
+
+    def _tell_tables(self, program: Any, job: Job, group: list[Volume], slices: Slices) -> None:
+        """Tables of pre-integrated slabs: made again for another transfer function or quite another length."""
+        step = round(LENGTHS * np.log2(slices.distance))
+        for k, volume in enumerate(group):
+            table = job.kept.get(
+                ("slab table", self.opaque, k),
+                (volume.transfer, step),
+                lambda v=volume: float_texture(job.device, slab_table(v, 2.0 ** (step / LENGTHS))),
+            )
+            table.use(TABLES + k)
+        put_units(program, slab_table=[TABLES + k for k in range(len(group))])
+        put(program, table_place=[place_in(table_range(v), v.value_range, table.width) for v in group])
+
+
+class Isosurfaces(Rays):
+    """Volumes of mode "iso"; a stage (engine.py)."""
+
+    opaque = True
+
+
+class Volumes(Rays):
+    """All other volumes; a stage (engine.py), the last of all."""
+
+
+def has_opaque(job: Job) -> bool:
+    """Whether the scene holds anything that may end a ray."""
+    objects = job.scene.objects
+    return any(isinstance(o, (Mesh, Points)) or (isinstance(o, Volume) and o.mode == "iso") for o in objects)
+
+
+def one_ray(job: Job) -> bool:
+    """Whether all sub-pixels of a pixel are on one ray."""
+    assert job.mask is not None and job.columns is not None
+    return one_view(job.mask.viewmap) and len(set(job.columns)) == 1
+
+
+def one_view(viewmap: ViewMap) -> bool:
+    """Whether a display shows one view in all of a pixel."""
+    each = viewmap.table if viewmap.table is not None else viewmap.offsets
+    assert each is not None
+    return bool((each == each[..., :1]).all())
+
+
+def render(job: Job, program: Any, target: Any, write_depth: bool = False, tiles: int = 0) -> None:
+    """Draw the rectangle of a group into so many tiles, or over a panel if 0."""
+    ctx = job.device.ctx
+    target.use()
+    ctx.enable_only(ctx.DEPTH_TEST if tiles else ctx.NOTHING)
+    target.depth_mask = write_depth
+    job.vertex_array(program, []).render(ctx.TRIANGLE_STRIP, vertices=4, instances=max(tiles, 1))
+    target.depth_mask = True

@@ -1,0 +1,3 @@
+"""x"""
+from typing import Any
+def draw_slices(*a: Any) -> None: ...
