@@ -140,7 +140,7 @@ class Rays(Stage):
             looks[k].emptiness.use(EMPTY + k)
         count = range(len(group))
         put_units(program, voxels=[VOXELS + k for k in count], emptiness=[EMPTY + k for k in count])
-        shared = job.draw.options.volume == "shared" and not self.opaque
+        shared = job.draw.options.volume == "shared" and group[0].mode == "composite"
         put(program, slices=(slices.first, slices.distance, slices.slabs), share_within=NEAR if shared else -1.0)
         put(program, **placing(group, job.draw.camera))
         materials = [v.material for v in group]

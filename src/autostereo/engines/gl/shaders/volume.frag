@@ -1,6 +1,6 @@
 // Emission and absorption of volumes along rays, front to back (Huebner 2007a, section 3; Engel 2001; engines/reference/volume.py).
-// Switches: AVERAGED: sub-pixels are attenuated by the mean of their alphas; OWN_EYES: highlights are those of each
-// ray's eye, else of the centre's; HALF_DEPTH: the depth where half of the light is taken is written.
+// Switches: AVERAGED: sub-pixels are attenuated by the mean of their alphas; HALF_DEPTH: the depth where half of the
+// light is taken is written.
 #include "lib/frame.glsl"
 #include "lib/color.glsl"
 #ifdef PANEL
@@ -8,55 +8,47 @@
 #include "lib/cameras.glsl"
 #endif
 #include "lib/shading.glsl"
+#include "lib/lanes.glsl"
 #include "lib/volume.glsl"
 #include "lib/volume_light.glsl"
-#include "lib/volume_slab.glsl"
 #include "lib/volume_target.glsl"
+#include "lib/volume_slab.glsl"
 
 layout(location = 0) out vec4 color;
+
+vec3 light = vec3(0.0);
+LANE through = LANE(1.0);
+float half_at = 1e30;
+
+void visit(int v, int l) {
+    if (v == 0 && l == 0) {
+        begin_slab();
+    }
+    add_to_slab(v, l);
+}
+
+void end_slab() {
+    LANE alpha = slab_alpha(), before = through;
+    light += (through * alpha) * (glow / max(optical, LANE(TINY)));
+#ifdef AVERAGED
+    through *= 1.0 - (LANES == 3 ? dot(vec3(alpha), vec3(1.0 / 3.0)) : greatest(alpha));
+#else
+    through *= 1.0 - alpha;
+#endif
+#ifdef HALF_DEPTH
+    // optical depth is taken to grow linearly through the part of the slab that volumes fill
+    float part = log(2.0 * greatest(before)) / greatest(optical);
+    bool here = greatest(before) > 0.5 && greatest(through) <= 0.5;
+    half_at = here ? mix(greatest(fill_begin), greatest(fill_end), part) : half_at;
+#endif
+    left = greatest(through) - ENOUGH;
+}
 
 void main() {
     start_rays();
     find_stretches(slices.x);
-    vec3 light = vec3(0.0);
-    float through[LANES];
-    for (int l = 0; l < LANES; ++l) {
-        through[l] = 1.0;
-    }
-    float left = 1.0;
-#ifdef HALF_DEPTH
-    float half_at = 1e30;
-#endif
-    while (left > ENOUGH && next_slab()) {
-        classify();
-        float total = 0.0;
-        left = 0.0;
-#ifdef HALF_DEPTH
-        float previous = through[0];
-#endif
-        for (int l = 0; l < LANES; ++l) {
-            light += (through[l] * alpha[l]) * pick[l] * emitted[l];
-            total += alpha[l];
-        }
-        for (int l = 0; l < LANES; ++l) {
-#ifdef AVERAGED
-            through[l] *= 1.0 - total / float(LANES);
-#else
-            through[l] *= 1.0 - alpha[l];
-#endif
-            left = max(left, through[l]);
-        }
-#ifdef HALF_DEPTH
-        if (previous > 0.5 && through[0] <= 0.5) {
-            half_at = half_depth(previous);
-        }
-#endif
-    }
-    vec3 passed = vec3(0.0);
-    for (int l = 0; l < LANES; ++l) {
-        passed += through[l] * pick[l];
-    }
-    color = over(light, passed);
+    march();
+    color = over(by_channel(light), by_channel(vec3(through)));
 #ifdef HALF_DEPTH
     gl_FragDepth = half_at < 1e30 ? window_from_depth(half_at) : 1.0;
 #endif

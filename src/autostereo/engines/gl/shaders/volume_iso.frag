@@ -7,6 +7,7 @@
 #include "lib/cameras.glsl"
 #endif
 #include "lib/shading.glsl"
+#include "lib/lanes.glsl"
 #include "lib/volume.glsl"
 #include "lib/volume_light.glsl"
 #include "lib/volume_target.glsl"
@@ -19,35 +20,51 @@ layout(location = 0) out vec4 color;
 layout(location = 1) out vec4 depths;
 #endif
 
-// Depth between two on different sides of the level: halved, and at last taken to be linear.
-float crossing(int l, float low, float high, bool starts_inside) {
-    for (int k = 0; k < BISECTIONS; ++k) {
-        float middle = 0.5 * (low + high);
-        if ((voxel_at(0, origin_x[l] + middle * turn_x[l], middle).a >= level) == starts_inside) {
-            low = middle;
-        } else {
-            high = middle;
+LANE low = LANE(0.0), high = LANE(-1.0);  // ends of the slab in which a ray first crosses; high < low: none so far
+LANE s_low = LANE(0.0);
+
+void visit(int v, int l) {
+}
+
+void end_slab() {
+    for (int l = 0; l < LANES; ++l) {
+        bool before = of(s_front[0], l) >= level, after = of(s_back[0], l) >= level;
+        if (of(high, l) < of(low, l) && of(far_end[0], l) > of(near_end[0], l) && before != after) {
+            low = with(low, l, of(near_end[0], l));
+            high = with(high, l, of(far_end[0], l));
+            s_low = with(s_low, l, of(s_front[0], l));
         }
     }
-    float a = voxel_at(0, origin_x[l] + low * turn_x[l], low).a - level;
-    float b = voxel_at(0, origin_x[l] + high * turn_x[l], high).a - level;
-    return a == b ? high : mix(low, high, clamp(a / (a - b), 0.0, 1.0));
+    left = greatest(choose(less(high, low), LANE(1.0), LANE(0.0)));
+}
+
+// Depth at which lane l crosses, between low and high: halved, and at last taken to be linear.
+float crossing(int l) {
+    float a = of(low, l), b = of(high, l);
+    bool starts_inside = of(s_low, l) >= level;
+    int k = 0;
+    do {
+        float middle = 0.5 * (a + b);
+        bool same_side = (voxel_on_ray(0, l, middle).a >= level) == starts_inside;
+        a = same_side ? middle : a;
+        b = same_side ? b : middle;
+        ++k;
+    } while (k < BISECTIONS);
+    float s = voxel_on_ray(0, l, a).a - level, e = voxel_on_ray(0, l, b).a - level;
+    return s == e ? b : mix(a, b, clamp(s / (s - e), 0.0, 1.0));
 }
 
 vec3 surface_color(int l, float t) {
 #ifdef SHADED
-    vec3 gradient = gradient_of(voxel_at(0, origin_x[l] + t * turn_x[l], t));
-    if (dot(gradient, gradient) < FLAT) {
-        return own_color;
-    }
+    vec3 gradient = gradient_of(voxel_on_ray(0, l, t));
     vec3 normal = unit(normal_from_gradient[0] * gradient), reflected, highlight;
-    normal = dot(normal, vec3(turn_x[l], turn_y, 1.0)) > 0.0 ? -normal : normal;
+    normal = dot(normal, vec3(of(turn_x, l), turn_y, 1.0)) > 0.0 ? -normal : normal;
     vec3 eye = vec3(0.0, lens.w, 0.0);
 #ifdef OWN_EYES
-    eye.x = origin_x[l];
+    eye.x = of(origin_x, l);
 #endif
     illuminate(eye_point(l, t), normal, eye, volume_material[0], reflected, highlight);
-    return own_color * reflected + highlight;
+    return dot(gradient, gradient) < FLAT ? own_color : own_color * reflected + highlight;
 #else
     return own_color;
 #endif
@@ -56,43 +73,24 @@ vec3 surface_color(int l, float t) {
 void main() {
     start_rays();
     find_stretches(slices.x);
-    float low[LANES], high[LANES];
-    bool met[LANES], starts_inside[LANES];
-    for (int l = 0; l < LANES; ++l) {
-        met[l] = false;
-        low[l] = high[l] = 0.0;
-        starts_inside[l] = false;
-    }
-    bool searching = true;
-    while (searching && next_slab()) {
-        searching = false;
-        for (int l = 0; l < LANES; ++l) {
-            bool in_front = s_front[l] >= level;
-            if (!met[l] && far_end[l] > near_end[l] && in_front != (s_back[l] >= level)) {
-                met[l] = true;
-                starts_inside[l] = in_front;
-                low[l] = near_end[l];
-                high[l] = far_end[l];
-            }
-            searching = searching || !met[l];
-        }
-    }
+    march();
     vec4 shown = before();
-    vec3 far = vec3(1.0);
-    for (int l = 0; l < LANES; ++l) {
-        float z = stop[l] < 1e30 ? window_from_depth(stop[l]) : 1.0;
-        if (met[l]) {
-            float t = crossing(l, low[l], high[l], starts_inside[l]);
-            z = window_from_depth(t);
-            shown.rgb = mix(shown.rgb, quantized(surface_color(l, t)), pick[l]);
+    vec3 far = by_channel(vec3(choose(less(stop, LANE(1e30)), (depth_range.x - 1.0 / stop) / depth_range.y, LANE(1.0))));
+    int l = 0;
+    do {
+        if (of(high, l) >= of(low, l)) {
+            float t = crossing(l);
+            vec3 which = LANES == 3 ? pick(l) : vec3(1.0);
+            shown.rgb = mix(shown.rgb, quantized(surface_color(l, t)), which);
+            far = mix(far, vec3(window_from_depth(t)), which);
         }
-        far = mix(far, vec3(z), pick[l]);
-    }
+        ++l;
+    } while (l < LANES);
 #ifdef PANEL
     color = shown;
     depths = vec4(far, 1.0);
 #else
-    if (!met[0]) {
+    if (!(greatest(high) >= greatest(low))) {
         discard;
     }
     color = vec4(shown.rgb, 1.0);

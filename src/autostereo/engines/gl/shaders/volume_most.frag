@@ -6,6 +6,7 @@
 #include "lib/viewmap.glsl"
 #include "lib/cameras.glsl"
 #endif
+#include "lib/lanes.glsl"
 #include "lib/volume.glsl"
 #include "lib/volume_target.glsl"
 
@@ -14,41 +15,35 @@ uniform vec2 most_place;        // scale and offset of a scalar's place in it
 
 layout(location = 0) out vec4 color;
 
+LANE most = LANE(-1.0), met = LANE(1e30);
+
+void visit(int v, int l) {
+}
+
+void end_slab() {
+    LANE found = choose(less(enter[0], leave[0]), s_back[0], LANE(-1.0));
+    met = choose(less(most, found), far_end[0], met);
+    most = max(most, found);
+}
+
+vec4 color_of(float value) {
+    return value < 0.0 ? vec4(0.0) : textureLod(most_colors, vec2(value * most_place.x + most_place.y, 0.5), 0.0);
+}
+
 void main() {
     start_rays();
     find_stretches(slices.x);
-    float most[LANES], met[LANES];
-    for (int l = 0; l < LANES; ++l) {
-        most[l] = -1.0;
-        met[l] = 1e30;
-    }
-    while (next_slab()) {
-        for (int l = 0; l < LANES; ++l) {
-            if (far_end[l] > near_end[l]) {
-                if (s_front[l] > most[l]) {
-                    most[l] = s_front[l];
-                    met[l] = near_end[l];
-                }
-                if (s_back[l] > most[l]) {
-                    most[l] = s_back[l];
-                    met[l] = far_end[l];
-                }
-            }
-        }
-    }
-    vec3 light = vec3(0.0), passed = vec3(0.0);
-    float depth = 1.0;
-    for (int l = 0; l < LANES; ++l) {
-        vec4 found = vec4(0.0);
-        if (most[l] >= 0.0) {
-            found = textureLod(most_colors, vec2(most[l] * most_place.x + most_place.y, 0.5), 0.0);
-        }
-        light += found.a * pick[l] * found.rgb;
-        passed += (1.0 - found.a) * pick[l];
-        depth = found.a >= 0.5 ? window_from_depth(met[l]) : 1.0;
-    }
-    color = over(light, passed);
+    march();
+#if LANES == 3
+    vec4 first = color_of(most.x), second = color_of(most.y), third = color_of(most.z);
+    vec3 alpha = by_channel(vec3(first.a, second.a, third.a));
+    vec3 own = first.rgb * pick(0) + second.rgb * pick(1) + third.rgb * pick(2);
+#else
+    vec4 first = color_of(most);
+    vec3 alpha = vec3(first.a), own = first.rgb;
+#endif
+    color = over(alpha * own, 1.0 - alpha);
 #ifdef HALF_DEPTH
-    gl_FragDepth = depth;
+    gl_FragDepth = first.a >= 0.5 ? window_from_depth(greatest(met)) : 1.0;
 #endif
 }

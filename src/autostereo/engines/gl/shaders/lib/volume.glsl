@@ -1,8 +1,10 @@
 // Volumes along the rays of a fragment, slab after slab: a stretch of depth between two slices, the same for all views
-// (Huebner 2007a, section 3.2; engines/reference/volume.py). Needs frame.glsl. Filled by volume_space.py.
+// (Huebner 2007a, section 3.2; engines/reference/volume.py). Needs frame.glsl, lanes.glsl. Filled by volume_space.py.
 //
-// Switches: VOLUMES; HALVES, half-spaces of each; LANES, rays of a fragment: 1, or 3 for the sub-pixels of a pixel;
-// GRADIENTS: they are wanted at the ends of slabs.
+// Switches: VOLUMES; HALVES, half-spaces of each; GRADIENTS: they are wanted at the ends of slabs.
+//
+// What follows is shaped by llvmpipe, which carries out both sides of an `if` and saves only where loops end early: rays
+// are looked up in a loop of as many rounds as there are different ones, and what is empty is skipped in a loop.
 
 uniform sampler3D voxels[VOLUMES];        // gradient, 0 at STEPS, 65535 steps in all; scalar 0 ... 1 of its range
 uniform usampler3D emptiness[VOLUMES];    // of blocks of BLOCK^3 cells: how many blocks away, any way, something shows
@@ -13,28 +15,30 @@ uniform vec3 slices;                      // depth of the first; distance; numbe
 uniform float share_within;               // rays closer together, in voxels, share a lookup; < 0: only equal rays
 uniform float along;                      // greatest number of voxels per unit of X
 
-// --- rays: eyes at (origin_x, lens.w, 0), and what X and Y gain per unit of depth. Lanes 0 and 2 are the two nearest eyes.
-float origin_x[LANES];
-float turn_x[LANES];
+// --- rays: eyes at (origin_x, lens.w, 0), and what X and Y gain per unit of depth. Lanes 0 and 2 are the nearest eyes.
+LANE origin_x, turn_x;
 float turn_y;
-float stop[LANES];                        // depth of what is opaque
+LANE stop;                                // depth of what is opaque
 bool twins;                               // lanes 0 and 2 are the same ray
 
-// --- slabs
-float enter[VOLUMES * LANES], leave[VOLUMES * LANES];
+// --- the slab that is looked at
+LANE enter[VOLUMES], leave[VOLUMES];
+LANE near_end[VOLUMES], far_end[VOLUMES];
 int slab, slab_end;
-int front_lanes, back_lanes;              // how many of the lanes were looked up at either end; the others are as lane 0
-float near_end[VOLUMES * LANES], far_end[VOLUMES * LANES];
-float s_front[VOLUMES * LANES], s_back[VOLUMES * LANES];
-vec3 g_front[VOLUMES * LANES], g_back[VOLUMES * LANES];
-float fastest[VOLUMES];                   // voxels per depth
+int rounds;                               // lanes that differ in it; the others are as lane 0
+LANE s_front[VOLUMES], s_back[VOLUMES];   // scalars at its ends
+#ifdef GRADIENTS
+LANE gx_front[VOLUMES], gy_front[VOLUMES], gz_front[VOLUMES];
+LANE gx_back[VOLUMES], gy_back[VOLUMES], gz_back[VOLUMES];
+#endif
+float left;                               // rays are followed while this is more than 0
 
-float ray_length(int lane) {
-    return sqrt(1.0 + turn_y * turn_y + turn_x[lane] * turn_x[lane]);
-}
+// A shader says what it does of a slab: in every round for lane l of volume v; and when all is looked up.
+void visit(int v, int l);
+void end_slab();
 
-vec3 eye_point(int lane, float t) {
-    return vec3(origin_x[lane] + t * turn_x[lane], lens.w + t * turn_y, t);
+vec3 eye_point(int l, float t) {
+    return vec3(of(origin_x, l) + t * of(turn_x, l), lens.w + t * turn_y, t);
 }
 
 vec3 index_at(int v, float x, float t) {
@@ -46,147 +50,140 @@ vec4 voxel_at(int v, float x, float t) {
     return textureLod(voxels[v], (index_at(v, x, t) + 0.5) / voxel_count[v], 0.0);
 }
 
+vec4 voxel_on_ray(int v, int l, float t) {
+    return voxel_at(v, of(origin_x, l) + t * of(turn_x, l), t);
+}
+
 vec3 gradient_of(vec4 voxel) {
     return voxel.rgb * 65535.0 - STEPS;
+}
+
+float most_of(vec3 a) {
+    return max(a.x, max(a.y, a.z));
 }
 
 // Depths at which rays enter and leave what is seen of the volumes, from depth `near` on.
 void find_stretches(float near) {
     float begin = 1e30, end = -1e30;
     for (int v = 0; v < VOLUMES; ++v) {
-        fastest[v] = 0.0;
-        for (int l = 0; l < LANES; ++l) {
-            float low = near, high = stop[l];
-            for (int h = 0; h < HALVES; ++h) {
-                vec4 row = half_spaces[v * HALVES + h];
-                float start = row.x * origin_x[l] + (row.y * lens.w + row.w);
-                float slope = row.x * turn_x[l] + (row.y * turn_y + row.z);
-                float crossing = -start / (slope == 0.0 ? 1.0 : slope);
-                low = slope > 0.0 ? max(low, crossing) : low;
-                high = slope < 0.0 ? min(high, crossing) : (slope == 0.0 && start < 0.0 ? -1.0 : high);
-            }
-            int i = v * LANES + l;
-            enter[i] = low;
-            leave[i] = max(low, high);
-            if (high > low) {
-                begin = min(begin, low);
-                end = max(end, high);
-            }
-            mat4 m = index_from_eye[v];
-            vec3 speed = abs(m[0].xyz * turn_x[l] + (m[1].xyz * turn_y + m[2].xyz));
-            fastest[v] = max(fastest[v], max(speed.x, max(speed.y, speed.z)));
+        LANE low = LANE(near), high = stop;
+        for (int h = 0; h < HALVES; ++h) {
+            vec4 row = half_spaces[v * HALVES + h];
+            LANE start = row.x * origin_x + (row.y * lens.w + row.w);
+            LANE slope = row.x * turn_x + (row.y * turn_y + row.z);
+            LANE crossing = -start / choose(same(slope, LANE(0.0)), LANE(1.0), slope);
+            low = choose(less(LANE(0.0), slope), max(low, crossing), low);
+            LANE beside = choose(less(start, LANE(0.0)), LANE(-1.0), high);
+            high = choose(less(slope, LANE(0.0)), min(high, crossing), choose(same(slope, LANE(0.0)), beside, high));
         }
+        enter[v] = low;
+        leave[v] = max(low, high);
+        begin = min(begin, least(choose(less(low, high), low, LANE(1e30))));
+        end = max(end, greatest(choose(less(low, high), high, LANE(-1e30))));
     }
-    slab = max(int(floor((begin - slices.x) / slices.y)), 0);
+    slab = clamp(int(floor((begin - slices.x) / slices.y)), 0, int(slices.z));
     slab_end = end > begin ? min(int(ceil((end - slices.x) / slices.y)), int(slices.z)) : slab;
-    front_lanes = back_lanes = 0;
-}
-
-// Least and greatest X of the lanes.
-vec2 spread(float t) {
-    float first = origin_x[0] + t * turn_x[0];
-    vec2 range = vec2(first);
-    for (int l = 1; l < LANES; ++l) {
-        float x = origin_x[l] + t * turn_x[l];
-        range = vec2(min(range.x, x), max(range.y, x));
-    }
-    return range;
 }
 
 // How many slabs from depth t on are empty for all rays: what shows is at least this many voxels away.
 int empty_slabs(float t) {
-    vec2 range = spread(t);
+    LANE x = origin_x + t * turn_x;
+    vec2 range = vec2(least(x), greatest(x)), turns = vec2(least(turn_x), greatest(turn_x));
     float most = 1e30;
     for (int v = 0; v < VOLUMES; ++v) {
+        mat4 m = index_from_eye[v];
         vec3 p = clamp(index_at(v, 0.5 * (range.x + range.y), t), vec3(0.0), voxel_count[v] - 1.001);
         ivec3 block = ivec3(p) >> BLOCK_BITS;
         float blocks = float(texelFetch(emptiness[v], block, 0).r);
+        vec3 deeper = m[1].xyz * turn_y + m[2].xyz;
+        vec3 speed = max(abs(m[0].xyz * turns.x + deeper), abs(m[0].xyz * turns.y + deeper)) * slices.y;
         vec3 off = abs(p - (vec3(block) + 0.5) * float(BLOCK));
-        float away = (blocks - 0.5) * float(BLOCK) - max(off.x, max(off.y, off.z));
-        vec3 side = 0.5 * (range.y - range.x) * abs(index_from_eye[v][0].xyz);
-        away -= max(side.x, max(side.y, side.z));
-        most = min(most, away / (fastest[v] * slices.y));
+        vec3 side = 0.5 * (range.y - range.x) * abs(m[0].xyz);
+        float away = (blocks - 0.5) * float(BLOCK) - most_of(off) - most_of(side);
+        most = min(most, away / most_of(speed));
     }
-    return int(clamp(most, -1.0, 1e6));
+    return int(clamp(most, 0.0, 1e6));
 }
 
-// How many lookups three rays need at depth t: 1 or 2 where rays lie within 2*share_within voxels of each other, so
-// that a lookup between them is share_within voxels off at most.
+// How many lookups rays need at depth t: 1 or 2 where they lie within 2*share_within voxels of each other, so that a
+// lookup between them is share_within voxels off at most; not where one of them is not inside.
 int lookups(float t) {
 #if LANES == 1
     return 1;
 #else
-    vec2 range = spread(t);
-    float pair = abs(origin_x[0] + t * turn_x[0] - origin_x[2] - t * turn_x[2]);
-    float within = 2.0 * share_within;
-    return (range.y - range.x) * along <= within ? 1 : twins || pair * along <= within ? 2 : 3;
+    LANE x = origin_x + t * turn_x;
+    float range = greatest(x) - least(x), within = 2.0 * share_within;
+    bool inside = VOLUMES == 1 && every(not_less(LANE(t), enter[0])) && every(not_less(leave[0], LANE(t)));
+    return inside && range * along <= within ? 1 : twins || (inside && abs(x.x - x.z) * along <= within) ? 2 : 3;
 #endif
 }
 
-// Look up the volumes where lanes are at depth t, clamped to their stretches.
-void look_up(float t, int count, out float s[VOLUMES * LANES], out vec3 g[VOLUMES * LANES]) {
-    for (int v = 0; v < VOLUMES; ++v) {
-        for (int l = 0; l < LANES; ++l) {
-            int i = v * LANES + l;
-            if (l < count) {
-                float own = clamp(t, enter[i], leave[i]);
-                float x = origin_x[l] + own * turn_x[l];
+// Look up lane l of volume v at depth t, clamped to its stretch; `count` lookups serve all lanes.
+void look_up(int v, int l, float t, int count) {
+    float own = clamp(t, of(enter[v], l), of(leave[v], l));
+    LANE x = origin_x + own * turn_x;
+    float at = of(x, l);
 #if LANES == 3
-                if (l == 0 && count < 3) {
-                    vec2 range = count == 1 ? spread(own) : vec2(x, origin_x[2] + own * turn_x[2]);
-                    x = 0.5 * (range.x + range.y);
-                }
+    at = count == 1 ? 0.5 * (least(x) + greatest(x)) : count == 2 && l != 1 ? 0.5 * (x.x + x.z) : at;
 #endif
-                vec4 found = voxel_at(v, x, own);
-                s[i] = found.a;
+    vec4 found = voxel_at(v, at, own);
+    s_back[v] = with(s_back[v], l, found.a);
 #ifdef GRADIENTS
-                g[i] = gradient_of(found);
-#else
-                g[i] = vec3(0.0);
+    vec3 g = gradient_of(found);
+    gx_back[v] = with(gx_back[v], l, g.x);
+    gy_back[v] = with(gy_back[v], l, g.y);
+    gz_back[v] = with(gz_back[v], l, g.z);
 #endif
-            } else {
-                s[i] = s[v * LANES];
-                g[i] = g[v * LANES];
-            }
-        }
-    }
 }
 
-// Go on to the next slab in which something may show, and look up both its ends; false behind the last one.
-bool next_slab() {
-    bool fresh = back_lanes == 0;
-    float t = slices.x + float(slab) * slices.y;
-    while (slab < slab_end && (fresh || (slab & 3) == 0)) {
-        int skipped = empty_slabs(t);
-        if (skipped < 1) {
-            break;
-        }
-        fresh = true;
-        slab += skipped;
-        t = slices.x + float(slab) * slices.y;
-    }
+// Take the rays through all slabs in which something may show. Where what was before is empty, a slab of no thickness
+// comes first, for its scalars.
+void march() {
     if (slab >= slab_end) {
-        return false;
+        return;
     }
-    ++slab;
-    float after = slices.x + float(slab) * slices.y;
-    bool inside = true;
-    for (int i = 0; i < VOLUMES * LANES; ++i) {
-        near_end[i] = clamp(t, enter[i], leave[i]);
-        far_end[i] = clamp(after, enter[i], leave[i]);
-        inside = inside && enter[i] <= t && leave[i] >= after;
-    }
-    int apart = LANES == 1 ? 1 : twins ? 2 : 3;
-    bool sharing = inside && VOLUMES == 1;
-    if (fresh) {
-        front_lanes = sharing ? lookups(t) : apart;
-        look_up(t, front_lanes, s_front, g_front);
-    } else {
-        front_lanes = back_lanes;
-        s_front = s_back;
-        g_front = g_back;
-    }
-    back_lanes = sharing ? lookups(after) : apart;
-    look_up(after, back_lanes, s_back, g_back);
-    return true;
+    bool fresh = true;
+    int front_count = 1;
+    do {
+        int skipped;
+        do {
+            skipped = empty_slabs(slices.x + float(slab) * slices.y);
+            slab += skipped;
+            fresh = fresh || skipped > 0;
+        } while (skipped > 0 && slab < slab_end);
+        int look_again = min(slab_end, (slab | (BLOCK - 1)) + 1);
+        do {
+            float t = slices.x + float(slab) * slices.y, after = slices.x + float(slab + 1) * slices.y;
+            after = fresh ? t : after;
+            int count = lookups(after);
+            rounds = fresh ? count : max(front_count, count);
+            for (int v = 0; v < VOLUMES; ++v) {
+                near_end[v] = clamp(LANE(t), enter[v], leave[v]);
+                far_end[v] = clamp(LANE(after), enter[v], leave[v]);
+            }
+            int l = 0;
+            do {
+                for (int v = 0; v < VOLUMES; ++v) {
+                    look_up(v, l, after, count);
+                    visit(v, l);
+                }
+                ++l;
+            } while (l < rounds);
+            for (int v = 0; v < VOLUMES; ++v) {
+                s_back[v] = filled(s_back[v], rounds);
+            }
+            end_slab();
+            s_front = s_back;
+#ifdef GRADIENTS
+            for (int v = 0; v < VOLUMES; ++v) {
+                gx_front[v] = filled(gx_back[v], rounds);
+                gy_front[v] = filled(gy_back[v], rounds);
+                gz_front[v] = filled(gz_back[v], rounds);
+            }
+#endif
+            front_count = count;
+            slab += fresh ? 0 : 1;
+            fresh = false;
+        } while (slab < look_again && left > 0.0);
+    } while (slab < slab_end && left > 0.0);
 }

@@ -1,77 +1,76 @@
 // Classification of a slab by a 2-D table of pre-integrated slabs (Engel 2001; scene/preintegration.py), and its light.
-// Needs volume.glsl, volume_light.glsl. Switches: SHADED; GRADIENTS: lit by the mean of the gradients at its ends
-// (Huebner 2007a, section 3.3), else by the gradient in its middle, at the price of a lookup.
+// Needs volume.glsl, volume_light.glsl, volume_target.glsl. Switches: SHADED; GRADIENTS: lit by the mean of the gradients
+// at its ends (Huebner 2007a, section 3.3), else by the gradient in its middle, at the price of a lookup; OWN_EYES:
+// highlights are those of each ray's eye, else of the centre's.
 
 uniform sampler2D slab_table[VOLUMES];   // (front, back): colour times extinction, extinction; bilinear
 uniform vec2 table_place[VOLUMES];       // scale and offset of a scalar's place in it
 
-float alpha[LANES];                      // opacity of the slab
-vec3 emitted[LANES];                     // its colour
-float optical[LANES];                    // its optical depth
-bool shows[VOLUMES];                     // whether a volume takes part in it on lane 0
+LANE optical;                            // optical depth of the slab
+vec3 glow;                               // colour times optical depth: of the ray, or each lane's channel of it
+vec4 first_texel;
+LANE fill_begin, fill_end;               // between which depths it holds anything
 
 // Colour under light times extinction, and extinction, of one ray.
-vec4 classify_ray(int v, int l) {
-    int i = v * LANES + l;
-    vec2 place = vec2(s_back[i], s_front[i]) * table_place[v].x + table_place[v].y;
+vec4 classify(int v, int l) {
+    vec2 place = vec2(of(s_back[v], l), of(s_front[v], l)) * table_place[v].x + table_place[v].y;
     vec4 texel = textureLod(slab_table[v], place, 0.0);
 #ifdef SHADED
-    if (texel.a > 0.0) {
-        vec3 point = vec3(0.0), eye = vec3(0.0, lens.w, 0.0);
-        float middle = 0.5 * (near_end[i] + far_end[i]);
+    vec3 point = vec3(0.0), eye = vec3(0.0, lens.w, 0.0);
+    float middle = 0.5 * (of(near_end[v], l) + of(far_end[v], l));
 #ifdef PLACED
-        point = eye_point(l, middle);
-#endif
-#ifdef GRADIENTS
-        vec3 gradient = g_front[i] + g_back[i];
-#else
-        vec3 gradient = 2.0 * gradient_of(voxel_at(v, origin_x[l] + middle * turn_x[l], middle));
+    point = eye_point(l, middle);
 #endif
 #ifdef OWN_EYES
-        eye.x = origin_x[l];
+    eye.x = of(origin_x, l);
 #endif
-        vec3 reflected, highlight;
-        light_inside(v, gradient, point, eye, reflected, highlight);
-        texel.rgb = texel.rgb * reflected + texel.a * highlight;
-    }
+#ifdef GRADIENTS
+    vec3 gradient = vec3(of(gx_front[v], l) + of(gx_back[v], l), of(gy_front[v], l) + of(gy_back[v], l),
+                         of(gz_front[v], l) + of(gz_back[v], l));
+#else
+    vec3 gradient = 2.0 * gradient_of(voxel_on_ray(v, l, middle));
+#endif
+    vec3 reflected, highlight;
+    light_inside(v, gradient, point, eye, reflected, highlight);
+    texel.rgb = texel.rgb * reflected + texel.a * highlight;
 #endif
     return texel;
 }
 
-// Fill alpha, emitted and optical. Volumes add their optical depths, and mix their colours by them. Lanes that share
-// their lookups at both ends share all but their length.
-void classify() {
-    int count = max(front_lanes, back_lanes);
-    vec4 first = vec4(0.0);
-    for (int l = 0; l < LANES; ++l) {
-        vec4 sum = vec4(0.0);
-        for (int v = 0; v < VOLUMES; ++v) {
-            int i = v * LANES + l;
-            vec4 texel = first;
-            if (l < count) {
-                texel = classify_ray(v, l);
-            }
-            if (l == 0) {
-                first = texel;  // read where lanes share, and they do so of one volume only
-                shows[v] = texel.a > 0.0;
-            }
-            sum += texel * ((far_end[i] - near_end[i]) * ray_length(l));
-        }
-        optical[l] = sum.a;
-        alpha[l] = 1.0 - exp(-sum.a);
-        emitted[l] = sum.rgb / max(sum.a, TINY);
+void begin_slab() {
+    optical = LANE(0.0);
+    glow = vec3(0.0);
+    fill_begin = LANE(1e30);
+    fill_end = LANE(-1e30);
+}
+
+// Add lane l of volume v. Volumes add their optical depths, and mix their colours by them.
+void add_to_slab(int v, int l) {
+    vec4 texel = classify(v, l);
+    float length_here = (of(far_end[v], l) - of(near_end[v], l)) * of(ray_length, l);
+    optical = with(optical, l, of(optical, l) + texel.a * length_here);
+#if LANES == 3
+    first_texel = l == 0 ? texel : first_texel;
+    glow = with(glow, l, of(glow, l) + dot(texel.rgb, pick(l)) * length_here);
+#else
+    glow += texel.rgb * length_here;
+#endif
+    if (texel.a * length_here > 0.0) {
+        fill_begin = with(fill_begin, l, min(of(fill_begin, l), of(near_end[v], l)));
+        fill_end = with(fill_end, l, max(of(fill_end, l), of(far_end[v], l)));
     }
 }
 
-// Depth at which a ray of transmittance `previous` before the slab has lost half of its light: optical depth is taken to
-// grow linearly through the part of the slab that volumes fill.
-float half_depth(float previous) {
-    float first = 1e30, last = -1e30;
-    for (int v = 0; v < VOLUMES; ++v) {
-        if (shows[v] && far_end[v * LANES] > near_end[v * LANES]) {
-            first = min(first, near_end[v * LANES]);
-            last = max(last, far_end[v * LANES]);
+// Opacity of the slab. Lanes that differ in nothing but their length, of one volume, are as the first.
+LANE slab_alpha() {
+#if LANES == 3
+    vec3 length_here = (far_end[0] - near_end[0]) * ray_length;
+    for (int l = 1; l < 3; ++l) {
+        if (rounds < (l == 1 ? 2 : 3)) {
+            optical = with(optical, l, first_texel.a * of(length_here, l));
+            glow = with(glow, l, dot(first_texel.rgb, pick(l)) * of(length_here, l));
         }
     }
-    return first + log(2.0 * previous) / optical[0] * (last - first);
+#endif
+    return 1.0 - exp(-optical);
 }

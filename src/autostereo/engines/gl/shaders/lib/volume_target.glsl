@@ -1,5 +1,5 @@
 // Where a fragment of a volume lies: in the tile of a view, or on a panel, where its sub-pixels have eyes of their own.
-// Needs frame.glsl, color.glsl, volume.glsl; views.glsl, or viewmap.glsl and cameras.glsl with the switch PANEL.
+// Needs frame.glsl, color.glsl, lanes.glsl, volume.glsl; views.glsl, or viewmap.glsl and cameras.glsl with the switch PANEL.
 //
 // Switches: OPAQUE: rays end at depths drawn before; COVERED: something was drawn before.
 
@@ -18,48 +18,76 @@ uniform sampler2D color_before;
 uniform vec3 background;
 #endif
 
-vec3 pick[LANES];              // the channels that a lane shows
+LANE ray_length;               // per unit of depth
+ivec3 order;                   // channel that a lane shows, if there are three
+
+// 1 at the channel that a lane shows.
+vec3 pick(int l) {
+    int c = l == 0 ? order.x : l == 1 ? order.y : order.z;
+    return vec3(equal(ivec3(c), ivec3(0, 1, 2)));
+}
+
+// What the lanes hold for their channels, or what one ray holds for all.
+vec3 by_channel(vec3 lanes) {
+#if LANES == 3
+    return lanes.x * pick(0) + lanes.y * pick(1) + lanes.z * pick(2);
+#else
+    return lanes;
+#endif
+}
+
+vec3 by_lane(vec3 channels) {
+#if LANES == 3
+    return vec3(dot(channels, pick(0)), dot(channels, pick(1)), dot(channels, pick(2)));
+#else
+    return channels;
+#endif
+}
 
 void start_rays() {
+    left = 1.0;
+    twins = false;
+    order = ivec3(0, 1, 2);
 #ifdef PANEL
     ivec2 at = ivec2(gl_FragCoord.xy), picture = mirrored(at, ivec2(window.xy));
     vec3 eyes = offsets_of_subpixels(at.x, at.y);
     vec2 place = vec2(picture) + vec2(0.0, sample_row);
 #if LANES == 3
-    // the two nearest eyes are lanes 0 and 2
     vec3 gap = abs(eyes.xyz - eyes.yzx);
-    ivec3 order = gap.z <= min(gap.x, gap.y) ? ivec3(0, 1, 2) : gap.x <= gap.y ? ivec3(0, 2, 1) : ivec3(1, 0, 2);
-    for (int l = 0; l < 3; ++l) {
-        int c = order[l];
-        pick[l] = vec3(equal(ivec3(c), ivec3(0, 1, 2)));
+    order = gap.z <= min(gap.x, gap.y) ? ivec3(0, 1, 2) : gap.x <= gap.y ? ivec3(0, 2, 1) : ivec3(1, 0, 2);
+    vec3 x;
+    for (int c = 0; c < 3; ++c) {
         vec3 ray = ray_direction(place + vec2(columns[c], 0.0), eyes[c]);
-        origin_x[l] = eyes[c];
-        turn_x[l] = ray.x;
+        x[c] = ray.x;
         turn_y = ray.y;
     }
-    twins = origin_x[0] == origin_x[2] && turn_x[0] == turn_x[2];
+    origin_x = by_lane(eyes);
+    turn_x = by_lane(x);
+    twins = origin_x.x == origin_x.z && turn_x.x == turn_x.z;
 #else
     vec3 ray = ray_direction(place + vec2(columns[0], 0.0), eyes[0]);
-    origin_x[0] = eyes[0];
+    origin_x = eyes[0];
 #endif
 #else
     vec3 ray = ray_direction(gl_FragCoord.xy - view.yz, view.x);
-    origin_x[0] = view.x;
+    origin_x = view.x;
 #endif
 #if LANES == 1
-    pick[0] = vec3(1.0);
-    turn_x[0] = ray.x;
+    turn_x = ray.x;
     turn_y = ray.y;
-    twins = false;
 #endif
-    for (int l = 0; l < LANES; ++l) {
-        stop[l] = 1e30;
+    ray_length = sqrt(1.0 + turn_y * turn_y + turn_x * turn_x);
+    stop = LANE(1e30);
 #ifdef OPAQUE
-        vec4 before = texelFetch(depth_before, ivec2(gl_FragCoord.xy), 0);
-        float z = LANES == 1 ? before.r : dot(pick[l], before.rgb);
-        stop[l] = z < 1.0 ? depth_from_window(z) : 1e30;
+    vec4 z = texelFetch(depth_before, ivec2(gl_FragCoord.xy), 0);
+#if LANES == 3
+    z.rgb = by_lane(z.rgb);
+    vec3 depth = 1.0 / (depth_range.x - z.rgb * depth_range.y);
+    stop = mix(vec3(1e30), depth, lessThan(z.rgb, vec3(1.0)));
+#else
+    stop = z.r < 1.0 ? depth_from_window(z.r) : 1e30;
 #endif
-    }
+#endif
 }
 
 // What was there before, opacity last.
