@@ -11,7 +11,7 @@ MAX_CAMERAS = 4096  # views of a panel, render.MAX_VIEWS: their offsets fill a u
 # Volumes on the gl engine (gl/volume*.py)
 BLOCK_BITS = 2  # log2 of the edge of a block of cells that are skipped together
 STEPS = 32767.0  # stored gradient of 0; as many steps up and down
-FLAT = 0.01  # squared length, in steps, of the sum of two gradients below which there is none
+FLAT = 0.0025  # squared length of a gradient, in steps, below which there is none
 ENOUGH = 1.0 / 512.0  # of light left, when a ray has seen enough
 BISECTIONS = 10  # of a slab, in search of an isosurface
 

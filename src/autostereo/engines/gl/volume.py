@@ -121,7 +121,7 @@ class Rays(Stage):
             "VOLUMES": len(group),
             "HALVES": most_half_spaces(group),
             "SHADED": shaded,
-            "GRADIENTS": shaded and job.draw.options.volume == "shared" and group[0].mode == "composite",
+            "MIDDLE": job.draw.options.volume == "exact",
             "LIGHTS": len(lights) if shaded else 0,
             "SHINY": shiny,
             "PLACED": shiny or any(place[3] != 0 for place, _ in lights),

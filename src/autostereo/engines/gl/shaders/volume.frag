@@ -20,13 +20,6 @@ vec3 light = vec3(0.0);
 LANE through = LANE(1.0);
 float half_at = 1e30;
 
-void visit(int v, int l) {
-    if (v == 0 && l == 0) {
-        begin_slab();
-    }
-    add_to_slab(v, l);
-}
-
 void end_slab() {
     LANE alpha = slab_alpha(), before = through;
     light += (through * alpha) * (glow / max(optical, LANE(TINY)));

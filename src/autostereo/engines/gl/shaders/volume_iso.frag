@@ -23,7 +23,7 @@ layout(location = 1) out vec4 depths;
 LANE low = LANE(0.0), high = LANE(-1.0);  // ends of the slab in which a ray first crosses; high < low: none so far
 LANE s_low = LANE(0.0);
 
-void visit(int v, int l) {
+void visit(int v, int l, vec4 voxel) {
 }
 
 void end_slab() {

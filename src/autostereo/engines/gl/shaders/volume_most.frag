@@ -17,7 +17,7 @@ layout(location = 0) out vec4 color;
 
 LANE most = LANE(-1.0), met = LANE(1e30);
 
-void visit(int v, int l) {
+void visit(int v, int l, vec4 voxel) {
 }
 
 void end_slab() {

@@ -1,7 +1,7 @@
 // Volumes along the rays of a fragment, slab after slab: a stretch of depth between two slices, the same for all views
 // (Huebner 2007a, section 3.2; engines/reference/volume.py). Needs frame.glsl, lanes.glsl. Filled by volume_space.py.
 //
-// Switches: VOLUMES; HALVES, half-spaces of each; GRADIENTS: they are wanted at the ends of slabs.
+// Switches: VOLUMES; HALVES, half-spaces of each.
 //
 // What follows is shaped by llvmpipe, which carries out both sides of an `if` and saves only where loops end early: rays
 // are looked up in a loop of as many rounds as there are different ones, and what is empty is skipped in a loop.
@@ -27,14 +27,11 @@ LANE near_end[VOLUMES], far_end[VOLUMES];
 int slab, slab_end;
 int rounds;                               // lanes that differ in it; the others are as lane 0
 LANE s_front[VOLUMES], s_back[VOLUMES];   // scalars at its ends
-#ifdef GRADIENTS
-LANE gx_front[VOLUMES], gy_front[VOLUMES], gz_front[VOLUMES];
-LANE gx_back[VOLUMES], gy_back[VOLUMES], gz_back[VOLUMES];
-#endif
 float left;                               // rays are followed while this is more than 0
 
-// A shader says what it does of a slab: in every round for lane l of volume v; and when all is looked up.
-void visit(int v, int l);
+// A shader says what it does of a slab: in every round with the voxel at the far end on lane l of volume v; and when all
+// lanes were looked up.
+void visit(int v, int l, vec4 voxel);
 void end_slab();
 
 vec3 eye_point(int l, float t) {
@@ -118,22 +115,15 @@ int lookups(float t) {
 #endif
 }
 
-// Look up lane l of volume v at depth t, clamped to its stretch; `count` lookups serve all lanes.
-void look_up(int v, int l, float t, int count) {
-    float own = clamp(t, of(enter[v], l), of(leave[v], l));
+// The voxel on lane l of volume v at the far end of the slab; `count` lookups serve all lanes.
+vec4 look_up(int v, int l, int count) {
+    float own = of(far_end[v], l);
     LANE x = origin_x + own * turn_x;
     float at = of(x, l);
 #if LANES == 3
     at = count == 1 ? 0.5 * (least(x) + greatest(x)) : count == 2 && l != 1 ? 0.5 * (x.x + x.z) : at;
 #endif
-    vec4 found = voxel_at(v, at, own);
-    s_back[v] = with(s_back[v], l, found.a);
-#ifdef GRADIENTS
-    vec3 g = gradient_of(found);
-    gx_back[v] = with(gx_back[v], l, g.x);
-    gy_back[v] = with(gy_back[v], l, g.y);
-    gz_back[v] = with(gz_back[v], l, g.z);
-#endif
+    return voxel_at(v, at, own);
 }
 
 // Take the rays through all slabs in which something may show. Where what was before is empty, a slab of no thickness
@@ -164,8 +154,9 @@ void march() {
             int l = 0;
             do {
                 for (int v = 0; v < VOLUMES; ++v) {
-                    look_up(v, l, after, count);
-                    visit(v, l);
+                    vec4 voxel = look_up(v, l, count);
+                    s_back[v] = with(s_back[v], l, voxel.a);
+                    visit(v, l, voxel);
                 }
                 ++l;
             } while (l < rounds);
@@ -174,13 +165,6 @@ void march() {
             }
             end_slab();
             s_front = s_back;
-#ifdef GRADIENTS
-            for (int v = 0; v < VOLUMES; ++v) {
-                gx_front[v] = filled(gx_back[v], rounds);
-                gy_front[v] = filled(gy_back[v], rounds);
-                gz_front[v] = filled(gz_back[v], rounds);
-            }
-#endif
             front_count = count;
             slab += fresh ? 0 : 1;
             fresh = false;

@@ -8,9 +8,7 @@ uniform vec4 volume_material[VOLUMES];       // ambient, diffuse, specular, shin
 void light_inside(int v, vec3 gradient, vec3 point, vec3 eye, out vec3 reflected, out vec3 highlight) {
     reflected = vec3(1.0);
     highlight = vec3(0.0);
-    if (dot(gradient, gradient) < FLAT) {
-        return;
-    }
+    bool plain = dot(gradient, gradient) < FLAT;
     vec4 m = volume_material[v];
     vec3 normal = unit(normal_from_gradient[v] * gradient);
     reflected = vec3(m.x);
@@ -29,4 +27,6 @@ void light_inside(int v, vec3 gradient, vec3 point, vec3 eye, out vec3 reflected
 #endif
     }
 #endif
+    reflected = plain ? vec3(1.0) : reflected;
+    highlight = plain ? vec3(0.0) : highlight;
 }
