@@ -18,16 +18,18 @@ class Beneath:
         self._depth = ctx.texture(size, channels, dtype="f4")
         for texture in (self._color, self._depth):
             texture.filter = (ctx.NEAREST, ctx.NEAREST)
-        self._target = ctx.framebuffer([self._color, self._depth])
+        self._target = ctx.framebuffer([self._color])
+        self._both = ctx.framebuffer([self._color, self._depth])
 
     @staticmethod
-    def of_tiles(job: Job, tiles: range) -> Beneath:
-        """Copy some tiles of the job's atlas, to the same places."""
+    def of_tiles(job: Job, tiles: range, depths: bool = True) -> Beneath:
+        """Copy some tiles of the job's atlas, to the same places; without depths, those of before stay."""
         layout = job.atlas.layout
         kept: Beneath = job.kept.get("beneath tiles", layout, lambda: Beneath(job.device, layout.size, 1))
         for tile in tiles:
             x, y = layout.tiles[tile]
-            kept._copy(job, (job.atlas.color, job.atlas.depth), (int(x), int(y), layout.width, layout.height))
+            box = int(x), int(y), layout.width, layout.height
+            kept._copy(job, (job.atlas.color, job.atlas.depth if depths else None), box)
         return kept
 
     @staticmethod
@@ -37,14 +39,16 @@ class Beneath:
         kept._copy(job, (panel.color, panel.depth), (0, 0, *panel.size))
         return kept
 
-    def _copy(self, job: Job, textures: tuple[Any, Any], box: tuple[int, int, int, int]) -> None:
+    def _copy(self, job: Job, textures: tuple[Any, Any | None], box: tuple[int, int, int, int]) -> None:
         ctx = job.device.ctx
-        program = job.program("screen.vert", "copy.frag")
+        program = job.program("screen.vert", "copy.frag", defines={"DEPTHS": textures[1] is not None})
         for unit, (name, texture) in enumerate(zip(("picture", "depths"), textures, strict=True)):
-            texture.use(unit)
-            program[name] = unit
-        self._target.viewport = box
-        self._target.use()
+            if texture is not None:
+                texture.use(unit)
+                program[name] = unit
+        target = self._both if textures[1] is not None else self._target
+        target.viewport = box
+        target.use()
         ctx.enable_only(ctx.NOTHING)
         job.cover(program)
 

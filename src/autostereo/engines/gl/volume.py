@@ -27,20 +27,24 @@ from ...scene.points import Points
 from ...scene.volume import Volume
 from ...viewmap import ViewMap
 from ..reference.shading import lights_in_eye_space
-from .atlas import Atlas
 from .beneath import Beneath
 from .context import Device
 from .job import Job, Stage
 from .panel import Panel
 from .programs import Defines
 from .volume_data import Look, float_texture, is_shaded, place_in, send, slab_table, table_range
-from .volume_slices import draw_slices
+from .volume_slices import slices_on_panel, slices_on_tiles
 from .volume_space import Slices, most_half_spaces, placing, put, put_units
 
 TOGETHER = 4  # volumes that compose in one march: each takes three of the 16 texture units that there are at least
 NEAR = 0.25  # voxels that a shared lookup may be beside a ray
 LENGTHS = 8  # lengths of slabs per doubling, for which tables are made
-FRAGMENTS = {"composite": "volume.frag", "mip": "volume_most.frag", "iso": "volume_iso.frag"}
+SHADERS = {
+    "composite": ("volume.vert", "volume.frag"),
+    "mip": ("volume.vert", "volume_most.frag"),
+    "iso": ("volume.vert", "volume_iso.frag"),
+    "slices": ("volume_slice.vert", "volume_slice.frag"),
+}
 VOXELS, EMPTY, TABLES, COLOR_BEFORE, DEPTH_BEFORE = 0, 4, 8, 12, 13  # texture units
 
 
@@ -72,11 +76,22 @@ class Rays(Stage):
         for number, group in enumerate(self._groups if slices else []):
             beneath = None
             if not self.opaque and (number > 0 or has_opaque(job)):
-                beneath = Beneath.of_tiles(job, tiles)
+                beneath = Beneath.of_tiles(job, tiles, depths=number == 0)
             program = self._program(job, group, slices, beneath)
             program["first_view"] = tiles.start
-            write_depth = self.opaque or job.draw.options.depth
-            render(job, program, job.atlas.target, write_depth, len(tiles))
+            if by_slices(job, group):
+                assert slices is not None
+                slices_on_tiles(job, program, slices.slabs, tiles)
+                continue
+            # what a mask hides has depth 0; isosurfaces have depths of their own
+            test = job.device.ctx.DEPTH_TEST if self.opaque or job.mask is not None else job.device.ctx.NOTHING
+            render(job, program, (job.atlas.target, test, self.opaque), len(tiles))
+            if job.draw.options.depth and not self.opaque:
+                job.atlas.target.color_mask = (False,) * 4
+                program = self._program(job, group, slices, beneath, half_depth=True)
+                program["first_view"] = tiles.start
+                render(job, program, (job.atlas.target, job.device.ctx.DEPTH_TEST, True), len(tiles))
+                job.atlas.target.color_mask = (True,) * 4
 
     def draw_panel(self, job: Job, panel: Panel) -> None:
         """Draw the sub-pixels of a panel."""
@@ -86,15 +101,21 @@ class Rays(Stage):
             target = panel.both if self.opaque else panel.target
             program = self._program(job, group, slices, beneath)
             put(program, columns=job.columns, sample_row=job.row, reach=job.draw.culling)
-            render(job, program, target)
+            if by_slices(job, group):
+                assert slices is not None
+                slices_on_panel(job, program, slices.slabs, panel)
+            else:
+                render(job, program, (target, job.device.ctx.NOTHING, False))
 
     def _slices(self, job: Job) -> Slices | None:
         return Slices.through(self._all, job.draw.camera, job.draw.options.step)
 
-    def _program(self, job: Job, group: list[Volume], slices: Slices | None, beneath: Beneath | None) -> Any:
+    def _program(
+        self, job: Job, group: list[Volume], slices: Slices | None, beneath: Beneath | None, half_depth: bool = False
+    ) -> Any:
         """The program of a group, told all about the frame."""
         assert slices is not None
-        on_panel, mode = job.columns is not None, group[0].mode
+        on_panel, way = job.columns is not None, "slices" if by_slices(job, group) else group[0].mode
         defines: Defines = {
             **self._switches(job, group),
             "PANEL": on_panel,
@@ -102,10 +123,10 @@ class Rays(Stage):
             "OPAQUE": beneath is not None and has_opaque(job),
             "COVERED": beneath is not None,
             "AVERAGED": on_panel and job.draw.options.alpha == "averaged",
-            "HALF_DEPTH": not on_panel and job.draw.options.depth,
+            "HALF_DEPTH": half_depth,
         }
         make = job.masked_program if on_panel else job.program
-        program = make("volume.vert", FRAGMENTS[mode], defines=defines)
+        program = make(*SHADERS[way], defines=defines)
         self._tell(program, job, group, slices)
         put(program, background=job.scene.background)
         if beneath is not None:
@@ -124,7 +145,7 @@ class Rays(Stage):
             "MIDDLE": job.draw.options.volume == "exact",
             "LIGHTS": len(lights) if shaded else 0,
             "SHINY": shiny,
-            "PLACED": shiny or any(place[3] != 0 for place, _ in lights),
+            "PLACED": any(place[3] != 0 for place, _ in lights),
             "OWN_EYES": self._own_eyes(job),
         }
 
@@ -192,6 +213,12 @@ def has_opaque(job: Job) -> bool:
     return any(isinstance(o, (Mesh, Points)) or (isinstance(o, Volume) and o.mode == "iso") for o in objects)
 
 
+def by_slices(job: Job, group: list[Volume]) -> bool:
+    """Whether proxy slices are blended: where volumes compose, and no depth is asked for that only a march finds."""
+    options = job.draw.options
+    return options.proxy == "slices" and group[0].mode == "composite" and not options.depth
+
+
 def one_ray(job: Job) -> bool:
     """Whether all sub-pixels of a pixel are on one ray."""
     assert job.mask is not None and job.columns is not None
@@ -205,11 +232,12 @@ def one_view(viewmap: ViewMap) -> bool:
     return bool((each == each[..., :1]).all())
 
 
-def render(job: Job, program: Any, target: Any, write_depth: bool = False, tiles: int = 0) -> None:
-    """Draw the rectangle of a group into so many tiles, or over a panel if 0."""
+def render(job: Job, program: Any, where: tuple[Any, int, bool], tiles: int = 1) -> None:
+    """Draw the rectangle of a group into so many tiles, or over a panel; where: target, flags, whether depth is written."""
     ctx = job.device.ctx
+    target, flags, write_depth = where
     target.use()
-    ctx.enable_only(ctx.DEPTH_TEST if tiles else ctx.NOTHING)
+    ctx.enable_only(flags)
     target.depth_mask = write_depth
-    job.vertex_array(program, []).render(ctx.TRIANGLE_STRIP, vertices=4, instances=max(tiles, 1))
+    job.vertex_array(program, []).render(ctx.TRIANGLE_STRIP, vertices=4, instances=tiles)
     target.depth_mask = True

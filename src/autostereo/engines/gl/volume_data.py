@@ -89,6 +89,7 @@ def new_texture(device: Device, volume: Volume, channels: int, kind: Any) -> Any
         raise UnsupportedError(
             f"a volume of {nx}×{ny}×{nz} voxels is larger than a 3-D texture of this device, {limit} voxels a side {remedy}"
         )
+    device.ctx.error  # noqa: B018  # reading forgets what went wrong before
     try:
         texture = device.ctx.texture3d(volume.shape, channels, dtype="f1" if kind is np.uint8 else "nu2", alignment=1)
         error = device.ctx.error

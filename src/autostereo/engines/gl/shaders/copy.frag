@@ -1,9 +1,14 @@
-// A picture and its depths, to be read while they are drawn over.
-uniform sampler2D picture, depths;
+// A picture, and its depths with the switch DEPTHS, to be read while they are drawn over.
+uniform sampler2D picture;
 layout(location = 0) out vec4 color;
+#ifdef DEPTHS
+uniform sampler2D depths;
 layout(location = 1) out vec4 depth;
+#endif
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
     color = texelFetch(picture, at, 0);
+#ifdef DEPTHS
     depth = texelFetch(depths, at, 0);
+#endif
 }

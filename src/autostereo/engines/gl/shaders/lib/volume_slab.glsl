@@ -55,9 +55,7 @@ Classified classify(int v, int l, vec4 voxel) {
 #else
     float t = of(far_end[v], l);
 #endif
-#ifdef PLACED
     point = eye_point(l, t);
-#endif
 #ifdef OWN_EYES
     eye.x = of(origin_x, l);
 #endif
