@@ -64,8 +64,8 @@ def reference_panel(scene, display, options):
 
 def panel(scene, display, method="single-pass", **options):
     need_device()
-    made = aus.render(scenes()[scene], DISPLAYS[display], RIG, method=method, engine="gl", options=aus.Options(**options))
-    return made.pixels.copy()
+    chosen = aus.Options(**options)
+    return aus.render(scenes()[scene], DISPLAYS[display], RIG, method=method, engine="gl", options=chosen).pixels.copy()
 
 
 def assert_agree(found, expected, share=0.999):
@@ -285,7 +285,7 @@ def test_every_type_of_value(dtype, wide, monkeypatch):
 def test_a_volume_that_a_texture_cannot_hold_is_refused(monkeypatch):
     device = need_device()
     monkeypatch.setattr(device, "limits", replace(device.limits, texture_3d=16))
-    with pytest.raises(UnsupportedError, match="20×20×20 voxels is larger than a 3-D texture of this device, 16 voxels"):
+    with pytest.raises(UnsupportedError, match="20×20×20 voxels is larger than a 3-D texture of this device, 16"):
         aus.Renderer(small(), "gl")
 
 

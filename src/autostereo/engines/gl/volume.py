@@ -1,13 +1,14 @@
 """Volumes on the gl engine: rays through the tiles of views, or through the sub-pixels of a panel in one pass.
 
-The methods of Hübner 2007a: `n-pass` and its kin follow a ray per pixel of every view; `single-pass` and `covering-quad`
-follow the rays of a panel's sub-pixels, each from its own eye, over what was gathered before. Rays march in the
-fragment shader (volume.frag), or slices are blended (`Options.proxy`, volume_slices.py).
+The methods of Hübner 2007a: `n-pass` and its kin follow a ray per pixel of every view; `single-pass` and
+`covering-quad` follow the rays of a panel's sub-pixels, each from its own eye, over what was gathered before. Rays
+march in the fragment shader (volume.frag), or slices are blended (`Options.proxy`, volume_slices.py).
 
 What the three rays of a pixel share: the search for what is empty, and the end of the march; with `volume="shared"`,
 where they pass within 2·NEAR voxels of each other, lookups too: what a ray is told then is the volume at most NEAR
-voxels beside it, so a scalar is off by no more than NEAR·|∂s/∂x| (per voxel). Displays that show one view in all
-of a pixel need one ray a pixel. With `volume="exact"` only equal rays share, and slabs are lit in their middle.
+voxels beside it, so a scalar is off by no more than NEAR·|∂s/∂x| (per voxel). Displays that show one view in all of
+a pixel need one ray a pixel. With `volume="exact"` only equal rays share, and slabs are lit in their middle, not
+by the mean of the light at their ends.
 
 Order of a scene: isosurfaces are opaque and come before points; then volumes that compose, all at once; then those of the
 greatest value one by one (engines/reference/picture.py).
@@ -16,6 +17,7 @@ greatest value one by one (engines/reference/picture.py).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -32,7 +34,7 @@ from .context import Device
 from .job import Job, Stage
 from .panel import Panel
 from .programs import Defines
-from .volume_data import Look, float_texture, is_shaded, place_in, send, slab_table, table_range
+from .volume_data import TABLE, Look, is_shaded, make_table, place_in, send, table_range
 from .volume_slices import slices_on_panel, slices_on_tiles
 from .volume_space import Slices, most_half_spaces, placing, put, put_units
 
@@ -155,7 +157,7 @@ class Rays(Stage):
 
     def _tell(self, program: Any, job: Job, group: list[Volume], slices: Slices) -> None:
         """Fill the uniforms of a group."""
-        voxels, looks = ([held[id(v)] for v in group] for held in (self._voxels, self._looks))
+        voxels, looks = [self._voxels[id(v)] for v in group], [self._looks[id(v)] for v in group]
         for k in range(len(group)):
             voxels[k].texture.use(VOXELS + k)
             looks[k].emptiness.use(EMPTY + k)
@@ -173,7 +175,7 @@ class Rays(Stage):
         volume = group[0]
         if volume.mode == "composite":
             self._tell_tables(program, job, group, slices)
-        elif volume.mode == "mip":
+        elif looks[0].colors is not None:
             looks[0].colors.use(TABLES)
             put_units(program, most_colors=TABLES)
             put(program, most_place=place_in((0.0, 1.0), (0.0, 1.0), looks[0].colors.width))
@@ -187,14 +189,11 @@ class Rays(Stage):
         """Tables of pre-integrated slabs: made again for another transfer function or quite another length."""
         step = round(LENGTHS * np.log2(slices.distance))
         for k, volume in enumerate(group):
-            table = job.kept.get(
-                ("slab table", self.opaque, k),
-                (volume.transfer, step),
-                lambda v=volume: float_texture(job.device, slab_table(v, 2.0 ** (step / LENGTHS))),
-            )
+            make = partial(make_table, job.device, volume, 2.0 ** (step / LENGTHS))
+            table = job.kept.get(("slab table", k), (volume.transfer, step), make)
             table.use(TABLES + k)
         put_units(program, slab_table=[TABLES + k for k in range(len(group))])
-        put(program, table_place=[place_in(table_range(v), v.value_range, table.width) for v in group])
+        put(program, table_place=[place_in(table_range(v), v.value_range, TABLE) for v in group])
 
 
 class Isosurfaces(Rays):
@@ -233,7 +232,10 @@ def one_view(viewmap: ViewMap) -> bool:
 
 
 def render(job: Job, program: Any, where: tuple[Any, int, bool], tiles: int = 1) -> None:
-    """Draw the rectangle of a group into so many tiles, or over a panel; where: target, flags, whether depth is written."""
+    """Draw the rectangle of a group into so many tiles, or over a panel.
+
+    where: the target, what is enabled, whether depth is written.
+    """
     ctx = job.device.ctx
     target, flags, write_depth = where
     target.use()

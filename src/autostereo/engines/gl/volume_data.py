@@ -1,8 +1,8 @@
 """Volumes in textures: voxels, once per scene; and what their transfer function makes of them.
 
-A texel holds the gradient and the scalar, as in Hübner 2007a, section 3.1, in 16 bits each: llvmpipe interpolates textures
-of 8 bits to 8 bits only, which shows. Without light a texel is the scalar alone. So a voxel takes 8 bytes or 2, whatever
-its type was, 4 and 1 where 16 bits would take more than WIDE bytes; the host holds a few layers of them at a time.
+A texel holds the gradient and the scalar, as in Hübner 2007a, section 3.1, in 16 bits each: llvmpipe interpolates
+textures of 8 bits to 8 bits only, which shows. Without light a texel is the scalar alone. So a voxel takes 8 bytes or
+2, whatever its type was, 4 and 1 where 16 bits would take more than WIDE bytes; the host holds a few layers of them.
 Nothing here depends on the transform of the volume: new transforms and transfer functions send no voxels again.
 """
 
@@ -87,7 +87,8 @@ def new_texture(device: Device, volume: Volume, channels: int, kind: Any) -> Any
     remedy = f"({device.renderer}): crop it, take every second voxel, or choose engine='cpu'"
     if max(volume.shape) > limit:
         raise UnsupportedError(
-            f"a volume of {nx}×{ny}×{nz} voxels is larger than a 3-D texture of this device, {limit} voxels a side {remedy}"
+            f"a volume of {nx}×{ny}×{nz} voxels is larger than a 3-D texture of this device, {limit} voxels a side "
+            f"{remedy}"
         )
     device.ctx.error  # noqa: B018  # reading forgets what went wrong before
     try:
@@ -203,6 +204,11 @@ def float_texture(device: Device, data: NDArray[np.float32]) -> Any:
     texture.filter = (device.ctx.LINEAR, device.ctx.LINEAR)
     texture.repeat_x = texture.repeat_y = False
     return texture
+
+
+def make_table(device: Device, volume: Volume, length: float) -> Any:
+    """The texture of `slab_table`."""
+    return float_texture(device, slab_table(volume, length))
 
 
 class Look:

@@ -64,4 +64,4 @@ def _blend(job: Job, program: Any, layer: Any, instances: int, depth_test: bool)
     ctx.enable_only(ctx.BLEND | ctx.DEPTH_TEST if depth_test else ctx.BLEND)
     ctx.blend_func = ctx.ONE, ONE_MINUS_SECOND_COLOR
     job.vertex_array(program, []).render(ctx.TRIANGLE_STRIP, vertices=4, instances=instances)
-    ctx.blend_func = ctx.ONE, ctx.ZERO  # drivers refuse two targets while a second source is set, even with blending off
+    ctx.blend_func = ctx.ONE, ctx.ZERO  # Mesa refuses two targets while a second source is set, even unblended
