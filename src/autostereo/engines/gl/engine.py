@@ -44,13 +44,14 @@ from . import frames
 from .blocks import Blocks, DepthRange, Mask, cameras_block
 from .context import Device, get_device
 from .job import Job, Kept
-from .mesh import Meshes
 from .panel import Panel
+from .plane_rasterizer import METHODS as PLANE_METHODS
+from .plane_rasterizer import PlaneMeshes
 from .points import PointClouds
 from .volume import Isosurfaces, Volumes
 
 STAGES: tuple[tuple[type, type[Any]], ...] = (
-    (Mesh, Meshes),
+    (Mesh, PlaneMeshes),
     (Volume, Isosurfaces),
     (Points, PointClouds),
     (Volume, Volumes),
@@ -59,6 +60,7 @@ METHODS: dict[type, tuple[str, ...]] = {
     Mesh: (
         *("single-pass", "n-pass", "n-pass-subres", "n-pass-masked"),
         *("instanced", "geometry-shader", "geometry-shader-painter", "covering-quad"),
+        *PLANE_METHODS,
     ),
     Points: ("single-pass", "n-pass", "n-pass-subres", "n-pass-masked", "instanced", "covering-quad"),
     Volume: ("single-pass", "n-pass", "n-pass-subres", "n-pass-masked", "covering-quad"),

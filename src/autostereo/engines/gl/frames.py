@@ -147,7 +147,7 @@ def by_channels(job: Job, stages: list[Stage]) -> bool:
     draw = job.draw
     assert draw.viewmap is not None
     if draw.method != "single-pass":
-        return draw.method == "covering-quad"
+        return draw.method == "covering-quad" or draw.method.startswith("plane-rasterizer")
     if draw.viewmap.continuous or not stages:
         return True
     views = VIEW_PIXEL * len(draw.offsets) * draw.camera.width * draw.camera.height

@@ -1,0 +1,285 @@
+"""Meshes by the plane rasteriser: parallel multi-view polygon rasterisation in compute shaders (PMR 2020).
+
+A triangle is set up once for all views and rasterised in the space of column, row and view:
+
+    vertices → setup → tiles → fine rasteriser, twice → pixel encoding
+
+`setup` clips, snaps, culls; `tiles` finds the blocks of 4×4 pixels × 4 views that a triangle may touch; the fine rasteriser
+leaves in every voxel the least depth, then the first triangle of that depth; `encode` shades what is seen and writes it
+to tiles of views, or of the channels of a panel (lib/plane_triangle.glsl, lib/plane_tile.glsl, plane_*.comp, plane_encode.frag).
+For a panel, depths and winners are kept per sub-pixel: each shows one camera, and no other voxel is looked at.
+
+Nothing is read back in between: dispatches take their size from the counts of the stage before. A tile that finds no
+room in the queue is rasterised where it was found; the queue is made larger for the next frame. Pictures that are too
+large for a buffer are drawn in rounds of some rows, scenes in rounds of some triangles.
+
+METHODS are variants: one pass; the same pipeline run with one view after the other; planes as the paper prints them,
+for comparison; triangles that begin with different views (section 4.3).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .job import Job
+from .mesh import Meshes, set_material, switches
+from .plane_buffers import (
+    BLOCK_VIEWS,
+    MAX_BLOCKS,
+    TRIANGLE,
+    Corners,
+    Piece,
+    Queue,
+    Round,
+    Voxels,
+    chunks,
+    rounds,
+    storage_limit,
+    upload_blocks,
+)
+from .programs import Defines
+
+METHODS = ("plane-rasterizer", "plane-rasterizer-n-pass", "plane-rasterizer-planar", "plane-rasterizer-staggered")
+VERSION = 430  # compute shaders and storage buffers
+BARRIERS = 0x2000 | 0x40 | 0x200  # GL_SHADER_STORAGE_, COMMAND_, BUFFER_UPDATE_BARRIER_BIT
+GROUP = 64  # invocations of a work group
+GROUPS = 65535  # work groups in one direction, as many as every device has
+STAGES = ("clear", "vertices", "setup", "tiles", "depth", "winner", "encode")
+
+_clock: dict[str, float] | None = None
+
+
+@contextmanager
+def stage_times() -> Iterator[dict[str, float]]:
+    """Seconds that each of STAGES takes in what is drawn meanwhile; every stage then waits for the one before."""
+    global _clock
+    before, _clock = _clock, dict.fromkeys(STAGES, 0.0)
+    try:
+        yield _clock
+    finally:
+        _clock = before
+
+
+@contextmanager
+def _stage(job: Job, name: str) -> Iterator[None]:
+    """Clock a stage, if asked for, and let the next one see what it wrote."""
+    if _clock is None:
+        yield
+    else:
+        job.device.ctx.finish()
+        start = time.perf_counter()
+        yield
+        job.device.ctx.finish()
+        _clock[name] += time.perf_counter() - start
+    job.device.ctx.memory_barrier(BARRIERS)
+
+
+@dataclass(frozen=True)
+class Pass:
+    """Blocks of views that one pass draws: the first, how many, and the camera offsets that they reach."""
+
+    first: int
+    count: int
+    reach: tuple[float, float]
+
+
+class PlaneMeshes(Meshes):
+    """The meshes of a scene, also by the methods here; a stage (engine.py)."""
+
+    def draw_views(self, job: Job, tiles: range) -> None:
+        """Draw the views of these tiles."""
+        if job.draw.method in METHODS:
+            Drawing(job, self._parts).views()
+        else:
+            super().draw_views(job, tiles)
+
+    def draw_channels(self, job: Job) -> None:
+        """Draw the sub-pixels of a panel, each channel into its tile."""
+        if job.draw.method in METHODS:
+            Drawing(job, self._parts).channels()
+        else:
+            super().draw_channels(job)
+
+
+class Drawing:
+    """One draw of meshes into the tiles of the job's atlas."""
+
+    def __init__(self, job: Job, parts: list[Any]) -> None:
+        job.device.require(VERSION, f"method {job.draw.method!r}")
+        self.job, self.parts = job, parts
+        kept, device = job.kept, job.device
+        self.limit = kept.get("plane limit", None, lambda: storage_limit(device))
+        self.chunks = chunks(parts, self.limit // (2 * TRIANGLE))
+        self.numbers = np.cumsum([0, *(part.triangles for part in parts)])
+        room = 2 * max(sum(piece[2] for piece in chunk) for chunk in self.chunks)
+        self.room = room
+        self.triangles = kept.get("plane triangles", room, lambda: device.ctx.buffer(reserve=room * TRIANGLE))
+        self.queue = kept.get("plane queue", None, lambda: Queue(device, self.limit))
+        self.corners = kept.get("plane corners", None, lambda: [Corners(device, part) for part in parts])
+        self.one_view = job.draw.method == "plane-rasterizer-n-pass"
+        self.size = 1 if self.one_view else BLOCK_VIEWS
+        self.blocks, self.block_buffer = upload_blocks(job, self.size)
+        self.panel = job.columns is not None
+        self.sample_at = (*(job.columns or (0.5, 0.5, 0.5)), job.row)
+        self.views_in_all = len(job.draw.offsets) if self.panel else job.count
+        self.queue.grow()
+
+    def views(self) -> None:
+        """Draw all views of the atlas."""
+        layout = self.job.atlas.layout
+        for views in self._passes():
+            tiles = range(views.first * self.size, min((views.first + views.count) * self.size, self.job.count))
+            for part in rounds((layout.width, layout.height), len(tiles), 0, self.limit):
+                self._clear(part)
+                self._raster(part, views)
+                self._encode(part, tiles)
+
+    def channels(self) -> None:
+        """Draw the sub-pixels of the atlas's channels."""
+        layout, count = self.job.atlas.layout, self.job.count
+        for part in rounds((layout.width, layout.height), count, len(self.blocks), self.limit):
+            self._clear(part)
+            self._show(part)
+            for views in self._passes():
+                self._raster(part, views)
+            self._encode(part, range(count))
+
+    def _passes(self) -> Iterator[Pass]:
+        step = 1 if self.one_view else MAX_BLOCKS
+        for first in range(0, len(self.blocks), step):
+            some = self.blocks[first : first + step, 4:6]
+            yield Pass(first, len(some), (float(some[0, 0]), float(some[-1, 1])))
+
+    # --- stages ----------------------------------------------------------------------------------------------
+
+    def _clear(self, part: Round) -> None:
+        samples = part.width * part.rows * part.planes
+        voxels = self.job.kept.get("plane voxels", samples, lambda: Voxels(self.job.device, samples))
+        with _stage(self.job, "clear"):
+            voxels.clear()
+        voxels.depths.bind_to_storage_buffer(3)
+        voxels.winners.bind_to_storage_buffer(4)
+        self.triangles.bind_to_storage_buffer(0)
+        self.queue.entries.bind_to_storage_buffer(1)
+        self.queue.counters.bind_to_storage_buffer(2)
+        self.block_buffer.bind_to_storage_buffer(5)
+
+    def _show(self, part: Round) -> None:
+        """What the panel's tiles show; made once for a panel that needs one round."""
+        job, draw = self.job, self.job.draw
+        key = (draw.viewmap, part, draw.flip_x, draw.flip_y, draw.offsets.tobytes(), job.first, self.size)
+        shown, offsets = job.kept.get("plane shown", key, lambda: self._find_shown(part))
+        shown.bind_to_storage_buffer(6)
+        offsets.bind_to_storage_buffer(7)
+
+    def _find_shown(self, part: Round) -> tuple[Any, Any]:
+        job, ctx = self.job, self.job.device.ctx
+        shown = ctx.buffer(reserve=8 * part.tiles * len(self.blocks))
+        offsets = ctx.buffer(reserve=4 * part.width * part.rows * part.planes)
+        shown.bind_to_storage_buffer(6)
+        offsets.bind_to_storage_buffer(7)
+        program = job.masked_program("plane_shown.comp", version=VERSION)
+        _set(program, picture=(part.width, part.rows), first_row=part.first_row, planes=(job.first, part.planes))
+        _set(program, grouping=(self.size, len(self.blocks)))
+        _run(program, part.tiles)
+        ctx.memory_barrier(BARRIERS)
+        return shown, offsets
+
+    def _raster(self, part: Round, views: Pass) -> None:
+        """Depths and winners of a pass; the queue is filled once if the scene is not cut into pieces."""
+        for find_depth in (True, False):
+            for chunk in self.chunks:
+                if find_depth or len(self.chunks) > 1:
+                    self._set_up(part, views, chunk)
+                    self._find_tiles(part, views, find_depth)
+                with _stage(self.job, "depth" if find_depth else "winner"):
+                    fine = self._program("plane_fine.comp", part, views)
+                    _set(fine, find_depth=find_depth, room=self.queue.room)
+                    fine.run_indirect(self.queue.counters, 4 * (8 + 6))
+                if not find_depth:
+                    self._find_tiles(part, views, find_depth, repeat=True)
+
+    def _set_up(self, part: Round, views: Pass, chunk: list[Piece]) -> None:
+        self._size_dispatches(part, views, 0)
+        for number, first, count in chunk:
+            mesh, corners = self.parts[number], self.corners[number]
+            with _stage(self.job, "vertices"):
+                program = self.job.program("plane_vertex.comp", defines=switches(self.job, mesh), version=VERSION)
+                set_material(program, self.job, mesh)
+                mesh.vertices.bind_to_storage_buffer(11)
+                corners.points.bind_to_storage_buffer(8)
+                corners.surfaces.bind_to_storage_buffer(10)
+                _set(program, count=mesh.corners)
+                _run(program, mesh.corners)
+            with _stage(self.job, "setup"):
+                mesh.indices.bind_to_storage_buffer(9)
+                program = self._program("plane_setup.comp", part, views)
+                _set(program, range=(first, count), first_triangle=int(self.numbers[number]), room=self.room)
+                _set(program, two_sided=mesh.two_sided, reach=views.reach)
+                _run(program, count)
+        self._size_dispatches(part, views, 1)
+
+    def _find_tiles(self, part: Round, views: Pass, find_depth: bool, repeat: bool = False) -> None:
+        """Fill the queue; or, where it has overflowed, rasterise everything once more."""
+        with _stage(self.job, "tiles"):
+            program = self._program("plane_tiles.comp", part, views)
+            _set(program, room=self.queue.room, triangle_room=self.room, find_depth=find_depth, everything=repeat)
+            for large in (False, True):
+                _set(program, large=large)
+                program.run_indirect(self.queue.counters, 4 * (8 + (9 if repeat else 0) + 3 * large))
+        if not repeat:
+            self._size_dispatches(part, views, 2)
+
+    def _size_dispatches(self, part: Round, views: Pass, after: int) -> None:
+        program = self._program("plane_args.comp", part, views)
+        _set(program, after_stage=after, room=self.queue.room)
+        program.run(1)
+        self.job.device.ctx.memory_barrier(BARRIERS)
+
+    def _program(self, name: str, part: Round, views: Pass) -> Any:
+        method = self.job.draw.method
+        defines: Defines = {
+            "PANEL": self.panel,
+            "PLANAR": method == "plane-rasterizer-planar",
+            "STAGGER": method == "plane-rasterizer-staggered",
+        }
+        program = self.job.program(name, defines=defines, version=VERSION)
+        _set(program, picture=(part.width, part.rows), first_row=part.first_row, sample_at=self.sample_at)
+        _set(program, pass_views=(views.first, views.count, self.size, self.views_in_all))
+        _set(program, planes=(self.job.first, part.planes), first_offset=float(self.job.draw.offsets[0]))
+        return program
+
+    def _encode(self, part: Round, tiles: range) -> None:
+        job, ctx = self.job, self.job.device.ctx
+        with _stage(job, "encode"):
+            job.atlas.target.use()
+            ctx.enable_only(ctx.DEPTH_TEST)
+            for number, (mesh, corners) in enumerate(zip(self.parts, self.corners, strict=True)):
+                defines = {**switches(job, mesh), "PANEL": self.panel}
+                program = job.program("tile.vert", "plane_encode.frag", defines=defines, version=VERSION)
+                set_material(program, job, mesh)
+                corners.points.bind_to_storage_buffer(8)
+                mesh.indices.bind_to_storage_buffer(9)
+                corners.surfaces.bind_to_storage_buffer(10)
+                _set(program, picture=(part.width, part.rows), first_row=part.first_row, first_view=tiles.start)
+                _set(program, first_tile=tiles.start, first_channel=job.first, sample_at=self.sample_at)
+                _set(program, range=(int(self.numbers[number]), mesh.triangles))
+                job.vertex_array(program, []).render(ctx.TRIANGLE_STRIP, vertices=4, instances=len(tiles))
+
+
+def _set(program: Any, **values: Any) -> None:
+    """Set those of the uniforms that the program uses."""
+    for name, value in values.items():
+        if name in program:
+            program[name] = value
+
+
+def _run(program: Any, invocations: int) -> None:
+    groups = -(-invocations // GROUP)
+    program.run(min(groups, GROUPS), -(-groups // GROUPS))

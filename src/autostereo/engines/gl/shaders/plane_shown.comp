@@ -1,0 +1,40 @@
+// Which sub-pixels of each tile of a panel show which block of views, and every sub-pixel's camera offset.
+#include "lib/frame.glsl"
+#include "lib/viewmap.glsl"
+#include "lib/cameras.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(std430, binding = 6) buffer Shown { uvec2 shown[]; };                            // as lib/plane_tile.glsl
+layout(std430, binding = 7) writeonly buffer CameraOffsets { float camera_offset[]; };
+
+uniform ivec2 picture;   // width; rows of this round
+uniform int first_row;
+uniform ivec2 planes;    // first channel and how many of them
+uniform ivec2 grouping;  // views per block, blocks
+
+void main() {
+    ivec2 tiles = (picture + 3) >> 2;
+    int k = int(gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64 + int(gl_LocalInvocationID.x);
+    if (k >= tiles.x * tiles.y) {
+        return;
+    }
+    ivec2 corner = 4 * ivec2(k % tiles.x, k / tiles.x);
+    for (int b = 0; b < grouping.y; ++b) {
+        shown[k * grouping.y + b] = uvec2(0u);
+    }
+    for (int i = 0; i < 16; ++i) {
+        ivec2 pixel = corner + ivec2(i & 3, i >> 2);
+        if (pixel.x >= picture.x || pixel.y >= picture.y) {
+            continue;
+        }
+        ivec2 at = mirrored(ivec2(pixel.x, pixel.y + first_row), ivec2(window.xy));
+        ivec3 block = nearest_views(at.x, at.y) / grouping.x;
+        vec3 offset = offsets_of_subpixels(at.x, at.y);
+        for (int c = planes.x; c < planes.x + planes.y; ++c) {
+            uvec2 bit = c < 2 ? uvec2(1u << (16 * c + i), 0u) : uvec2(0u, 1u << i);
+            shown[k * grouping.y + block[c]] |= bit;
+            camera_offset[((c - planes.x) * picture.y + pixel.y) * picture.x + pixel.x] = offset[c];
+        }
+    }
+}

@@ -1,0 +1,37 @@
+// Stage 0 of the plane rasteriser: a mesh's vertices in eye space, once for all views.
+#include "lib/frame.glsl"
+#include "lib/shading.glsl"
+#include "lib/surface.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(std430, binding = 11) readonly buffer Vertices { float vertices[]; };
+layout(std430, binding = 8) writeonly buffer Points { vec4 points[]; };
+layout(std430, binding = 10) writeonly buffer Surfaces { Surface surfaces[]; };
+
+uniform int count;
+
+const int SIZE =
+#ifdef TEXTURED
+    11;
+#else
+    9;
+#endif
+
+void main() {
+    int k = int(gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64 + int(gl_LocalInvocationID.x);
+    if (k >= count) {
+        return;
+    }
+    int at = k * SIZE;
+    vec3 position = vec3(vertices[at], vertices[at + 1], vertices[at + 2]);
+    vec3 normal = vec3(vertices[at + 3], vertices[at + 4], vertices[at + 5]);
+    vec3 color = vec3(vertices[at + 6], vertices[at + 7], vertices[at + 8]);
+    vec2 uv = vec2(0.0);
+#ifdef TEXTURED
+    uv = vec2(vertices[at + 9], vertices[at + 10]);
+#endif
+    vec3 point = (eye_from_local * vec4(position, 1.0)).xyz;
+    points[k] = vec4(point, 0.0);
+    surfaces[k] = surface_at(point, mat3(eye_from_local) * normal, color, uv);
+}
