@@ -10,18 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...viewmap import offset_at
+from ..constants import MEMORY_WIDTH
 from .context import Device
 from .job import Job
 from .mesh_buffers import Part
 
 BLOCK_VIEWS = 4  # views of a tile (PMR 2020, section 4: 4×4×4 voxels)
 MAX_BLOCKS = 256  # of a pass: 8 bits of an entry
-TRIANGLE = 64  # bytes of a Triangle (lib/plane_triangle.glsl)
-CORNER = 16, 96  # bytes of a vertex in eye space, and of its Surface (lib/surface.glsl) at most
-ENTRY = 8  # bytes of a tile in the queue
-COUNTERS = 4 * (8 + 15)  # bytes
+MAX_TRIANGLES = 2**20  # set up at a time; near clipping may double them
+MAX_SAMPLES = 2**25  # voxels, or sub-pixels, of a round
+MAX_ENTRIES = 2**24  # in the queue
+TRIANGLE_TEXELS = 4  # of lib/plane_triangle.glsl
+SURFACE_TEXELS = 4  # of lib/plane_surface.glsl
 FIRST_ROOM = 2**16  # entries that the queue holds at first
-BLANK = 2**22  # bytes that are set at once
+COUNTERS = 4 * (8 + 15)  # bytes
+BLANK_ROWS = 256  # that are set at once
 Piece = tuple[int, int, int]  # part, its first triangle, how many
 
 
@@ -40,19 +43,27 @@ class Round:
         return -(-self.width // 4) * -(-self.rows // 4)
 
 
-def storage_limit(device: Device) -> int:
-    """Bytes of a buffer that shaders can write, on this device; OpenGL 4.3 promises 16 MB."""
-    return min(int(device.ctx.info.get("GL_MAX_SHADER_STORAGE_BLOCK_SIZE", 2**24)), device.limits.buffer)
+class Memory:
+    """An array of `count` elements that shaders read and write, as a picture (lib/plane_memory.glsl)."""
+
+    def __init__(self, device: Device, count: int, components: int, dtype: str) -> None:
+        rows = max(1, -(-count // MEMORY_WIDTH))
+        device.check_texture((MEMORY_WIDTH, rows), "memory of the plane rasteriser")
+        self.texture = device.ctx.texture((MEMORY_WIDTH, rows), components, dtype=dtype)
+
+    def bind(self, unit: int) -> None:
+        """Bind it to an image unit."""
+        self.texture.bind_to_image(unit)
 
 
-def rounds(size: tuple[int, int], planes: int, blocks: int, limit: int) -> Iterator[Round]:
-    """Cut a picture (width, height) into rows whose buffers fit into `limit` bytes.
+def rounds(size: tuple[int, int], planes: int, blocks: int) -> Iterator[Round]:
+    """Cut a picture (width, height) into rows whose memory is bounded.
 
     blocks: of views, for a panel's table of what each tile shows; else 0.
     """
     width, height = size
-    tile_row = max(4 * width * planes * 4, -(-width // 4) * blocks * 8)  # bytes of four rows
-    step = 4 * max(1, limit // tile_row)
+    tile_row = max(4 * width * planes, -(-width // 4) * blocks)  # elements for four rows
+    step = 4 * max(1, MAX_SAMPLES // tile_row)
     for first in range(0, height, step):
         yield Round(width, first, min(step, height - first), planes)
 
@@ -76,48 +87,45 @@ def chunks(parts: Sequence[Part], most: int) -> list[list[Piece]]:
 class Queue:
     """Tiles to be rasterised, and the counts of a pass; as large as the frame before would have needed."""
 
-    def __init__(self, device: Device, limit: int) -> None:
-        self._ctx, self._most = device.ctx, limit // ENTRY
+    def __init__(self, device: Device) -> None:
+        self._device = device
         self.counters = device.ctx.buffer(bytes(COUNTERS))
-        self.room = min(FIRST_ROOM, self._most)
-        self.entries = device.ctx.buffer(reserve=self.room * ENTRY)
+        self._make(FIRST_ROOM)
 
-    def wanted(self) -> int:
-        """The most tiles that a pass has asked for since last asked; waits for the device."""
-        found = int(np.frombuffer(self.counters.read(16), np.uint32)[3])
-        self.counters.write(bytes(4), 12)
-        return found
+    def _make(self, room: int) -> None:
+        self.room, self.entries = room, Memory(self._device, room, 4, "u4")
 
     def grow(self) -> None:
         """Make room for what was asked for, and a quarter more; called when the frame before is long finished."""
-        wanted = self.wanted()
-        if wanted > self.room:
-            self.room = min(wanted + wanted // 4, self._most)
-            self.entries = self._ctx.buffer(reserve=self.room * ENTRY)
+        wanted = int(np.frombuffer(self.counters.read(16), np.uint32)[3])
+        self.counters.write(bytes(4), 12)
+        if self.room < min(wanted, MAX_ENTRIES):
+            self._make(min(wanted + wanted // 4, MAX_ENTRIES))
 
 
 class Voxels:
     """Depth and winner of every sample of a round."""
 
     def __init__(self, device: Device, samples: int) -> None:
-        self._ctx, self._size = device.ctx, 4 * samples
-        self.depths = device.ctx.buffer(reserve=self._size)
-        self.winners = device.ctx.buffer(reserve=self._size)
-        self._blank = device.ctx.buffer(b"\xff" * min(BLANK, self._size))
+        self.depths, self.winners = (Memory(device, samples, 1, "u4") for _ in range(2))
+        self._blank = device.ctx.buffer(b"\xff" * (4 * MEMORY_WIDTH * BLANK_ROWS))
 
     def clear(self) -> None:
         """Nothing seen: all bits set, greater than any depth or number."""
-        for buffer in (self.depths, self.winners):
-            for first in range(0, self._size, BLANK):
-                count = min(BLANK, self._size - first)
-                self._ctx.copy_buffer(buffer, self._blank, count, read_offset=0, write_offset=first)
+        for memory in (self.depths, self.winners):
+            height = memory.texture.height
+            for first in range(0, height, BLANK_ROWS):
+                box = (0, first, MEMORY_WIDTH, min(BLANK_ROWS, height - first))
+                memory.texture.write(self._blank, box)
 
 
 class Corners:
-    """Vertices of a part in eye space."""
+    """A part's triangles, and its vertices in eye space."""
 
     def __init__(self, device: Device, part: Part) -> None:
-        self.points, self.surfaces = (device.ctx.buffer(reserve=size * part.corners) for size in CORNER)
+        self.triangles = Memory(device, part.triangles, 4, "u4")
+        self.points = Memory(device, part.corners, 4, "f4")
+        self.surfaces = Memory(device, SURFACE_TEXELS * part.corners, 4, "f4")
 
 
 def blocks_of(offsets: NDArray[np.float64], size: int, continuous: bool) -> NDArray[np.float32]:
@@ -139,10 +147,10 @@ def blocks_of(offsets: NDArray[np.float64], size: int, continuous: bool) -> NDAr
 
 
 def upload_blocks(job: Job, size: int) -> tuple[NDArray[np.float32], Any]:
-    """The blocks of the job's views, and a buffer of them, that of the frame before if they are the same."""
+    """The blocks of the job's views, and a texture of them, that of the frame before if they are the same."""
     views = job.draw.offsets if job.columns is not None else job.draw.offsets[job.first : job.first + job.count]
     viewmap = job.draw.viewmap
     continuous = job.columns is not None and viewmap is not None and viewmap.continuous
     found = blocks_of(views, size, continuous)
-    raw = found.tobytes()
-    return found, job.kept.get(("plane blocks", size), raw, lambda: job.device.ctx.buffer(raw))
+    raw, ctx = found.tobytes(), job.device.ctx
+    return found, job.kept.get(("plane blocks", size), raw, lambda: ctx.texture((2, len(found)), 4, raw, dtype="f4"))

@@ -32,22 +32,23 @@ from .mesh import Meshes, set_material, switches
 from .plane_buffers import (
     BLOCK_VIEWS,
     MAX_BLOCKS,
-    TRIANGLE,
+    MAX_TRIANGLES,
+    TRIANGLE_TEXELS,
     Corners,
+    Memory,
     Piece,
     Queue,
     Round,
     Voxels,
     chunks,
     rounds,
-    storage_limit,
     upload_blocks,
 )
 from .programs import Defines
 
 METHODS = ("plane-rasterizer", "plane-rasterizer-n-pass", "plane-rasterizer-planar", "plane-rasterizer-staggered")
 VERSION = 430  # compute shaders and storage buffers
-BARRIERS = 0x2000 | 0x40 | 0x200  # GL_SHADER_STORAGE_, COMMAND_, BUFFER_UPDATE_BARRIER_BIT
+BARRIERS = 0x2000 | 0x20 | 0x40 | 0x200  # GL_SHADER_STORAGE_, _SHADER_IMAGE_ACCESS_, COMMAND_, BUFFER_UPDATE_BARRIER_BIT
 GROUP = 64  # invocations of a work group
 GROUPS = 65535  # work groups in one direction, as many as every device has
 STAGES = ("clear", "vertices", "setup", "tiles", "depth", "winner", "encode")
@@ -114,28 +115,39 @@ class Drawing:
         job.device.require(VERSION, f"method {job.draw.method!r}")
         self.job, self.parts = job, parts
         kept, device = job.kept, job.device
-        self.limit = kept.get("plane limit", None, lambda: storage_limit(device))
-        self.chunks = chunks(parts, self.limit // (2 * TRIANGLE))
+        self.chunks = chunks(parts, MAX_TRIANGLES)
         self.numbers = np.cumsum([0, *(part.triangles for part in parts)])
-        room = 2 * max(sum(piece[2] for piece in chunk) for chunk in self.chunks)
-        self.room = room
-        self.triangles = kept.get("plane triangles", room, lambda: device.ctx.buffer(reserve=room * TRIANGLE))
-        self.queue = kept.get("plane queue", None, lambda: Queue(device, self.limit))
-        self.corners = kept.get("plane corners", None, lambda: [Corners(device, part) for part in parts])
+        self.room = room = 2 * max(sum(piece[2] for piece in chunk) for chunk in self.chunks)
+        self.triangles = kept.get("plane triangles", room, lambda: Memory(device, TRIANGLE_TEXELS * room, 4, "f4"))
+        self.queue = kept.get("plane queue", None, lambda: Queue(device))
+        self.corners = kept.get("plane corners", None, self._send_corners)
         self.one_view = job.draw.method == "plane-rasterizer-n-pass"
         self.size = 1 if self.one_view else BLOCK_VIEWS
-        self.blocks, self.block_buffer = upload_blocks(job, self.size)
+        self.blocks, self.block_texture = upload_blocks(job, self.size)
         self.panel = job.columns is not None
         self.sample_at = (*(job.columns or (0.5, 0.5, 0.5)), job.row)
         self.views_in_all = len(job.draw.offsets) if self.panel else job.count
         self.queue.grow()
+
+    def _send_corners(self) -> list[Corners]:
+        result = []
+        for part in self.parts:
+            corners = Corners(self.job.device, part)
+            corners.triangles.bind(1)
+            part.indices.bind_to_storage_buffer(1)
+            program = self.job.program("plane_corners.comp", version=VERSION)
+            _set(program, count=part.triangles)
+            _run(program, part.triangles)
+            result.append(corners)
+        self.job.device.ctx.memory_barrier(BARRIERS)
+        return result
 
     def views(self) -> None:
         """Draw all views of the atlas."""
         layout = self.job.atlas.layout
         for views in self._passes():
             tiles = range(views.first * self.size, min((views.first + views.count) * self.size, self.job.count))
-            for part in rounds((layout.width, layout.height), len(tiles), 0, self.limit):
+            for part in rounds((layout.width, layout.height), len(tiles), 0):
                 self._clear(part)
                 self._raster(part, views)
                 self._encode(part, tiles)
@@ -143,7 +155,7 @@ class Drawing:
     def channels(self) -> None:
         """Draw the sub-pixels of the atlas's channels."""
         layout, count = self.job.atlas.layout, self.job.count
-        for part in rounds((layout.width, layout.height), count, len(self.blocks), self.limit):
+        for part in rounds((layout.width, layout.height), count, len(self.blocks)):
             self._clear(part)
             self._show(part)
             for views in self._passes():
@@ -163,32 +175,30 @@ class Drawing:
         voxels = self.job.kept.get("plane voxels", samples, lambda: Voxels(self.job.device, samples))
         with _stage(self.job, "clear"):
             voxels.clear()
-        voxels.depths.bind_to_storage_buffer(3)
-        voxels.winners.bind_to_storage_buffer(4)
-        self.triangles.bind_to_storage_buffer(0)
-        self.queue.entries.bind_to_storage_buffer(1)
-        self.queue.counters.bind_to_storage_buffer(2)
-        self.block_buffer.bind_to_storage_buffer(5)
+        voxels.depths.bind(2)
+        voxels.winners.bind(3)
+        self.triangles.bind(0)
+        self.queue.counters.bind_to_storage_buffer(0)
 
     def _show(self, part: Round) -> None:
         """What the panel's tiles show; made once for a panel that needs one round."""
         job, draw = self.job, self.job.draw
         key = (draw.viewmap, part, draw.flip_x, draw.flip_y, draw.offsets.tobytes(), job.first, self.size)
         shown, offsets = job.kept.get("plane shown", key, lambda: self._find_shown(part))
-        shown.bind_to_storage_buffer(6)
-        offsets.bind_to_storage_buffer(7)
+        shown.bind(4)
+        offsets.bind(5)
 
     def _find_shown(self, part: Round) -> tuple[Any, Any]:
-        job, ctx = self.job, self.job.device.ctx
-        shown = ctx.buffer(reserve=8 * part.tiles * len(self.blocks))
-        offsets = ctx.buffer(reserve=4 * part.width * part.rows * part.planes)
-        shown.bind_to_storage_buffer(6)
-        offsets.bind_to_storage_buffer(7)
+        job, device = self.job, self.job.device
+        shown = Memory(device, part.tiles * len(self.blocks), 2, "u4")
+        offsets = Memory(device, part.width * part.rows * part.planes, 1, "f4")
+        shown.bind(4)
+        offsets.bind(5)
         program = job.masked_program("plane_shown.comp", version=VERSION)
         _set(program, picture=(part.width, part.rows), first_row=part.first_row, planes=(job.first, part.planes))
         _set(program, grouping=(self.size, len(self.blocks)))
         _run(program, part.tiles)
-        ctx.memory_barrier(BARRIERS)
+        device.ctx.memory_barrier(BARRIERS)
         return shown, offsets
 
     def _raster(self, part: Round, views: Pass) -> None:
@@ -212,17 +222,19 @@ class Drawing:
             with _stage(self.job, "vertices"):
                 program = self.job.program("plane_vertex.comp", defines=switches(self.job, mesh), version=VERSION)
                 set_material(program, self.job, mesh)
-                mesh.vertices.bind_to_storage_buffer(11)
-                corners.points.bind_to_storage_buffer(8)
-                corners.surfaces.bind_to_storage_buffer(10)
+                mesh.vertices.bind_to_storage_buffer(1)
+                corners.points.bind(6)
+                corners.surfaces.bind(7)
                 _set(program, count=mesh.corners)
                 _run(program, mesh.corners)
             with _stage(self.job, "setup"):
-                mesh.indices.bind_to_storage_buffer(9)
+                corners.triangles.bind(1)
                 program = self._program("plane_setup.comp", part, views)
                 _set(program, range=(first, count), first_triangle=int(self.numbers[number]), room=self.room)
                 _set(program, two_sided=mesh.two_sided, reach=views.reach)
                 _run(program, count)
+        self.queue.entries.bind(1)
+        self.block_texture.bind_to_image(7)
         self._size_dispatches(part, views, 1)
 
     def _find_tiles(self, part: Round, views: Pass, find_depth: bool, repeat: bool = False) -> None:
@@ -264,9 +276,9 @@ class Drawing:
                 defines = {**switches(job, mesh), "PANEL": self.panel}
                 program = job.program("tile.vert", "plane_encode.frag", defines=defines, version=VERSION)
                 set_material(program, job, mesh)
-                corners.points.bind_to_storage_buffer(8)
-                mesh.indices.bind_to_storage_buffer(9)
-                corners.surfaces.bind_to_storage_buffer(10)
+                corners.triangles.bind(1)
+                corners.points.bind(6)
+                corners.surfaces.bind(7)
                 _set(program, picture=(part.width, part.rows), first_row=part.first_row, first_view=tiles.start)
                 _set(program, first_tile=tiles.start, first_channel=job.first, sample_at=self.sample_at)
                 _set(program, range=(int(self.numbers[number]), mesh.triangles))

@@ -1,12 +1,13 @@
 // Between the stages of the plane rasteriser: sizes of the next dispatches, from the counts of the last.
 #include "lib/frame.glsl"
+#include "lib/plane_memory.glsl"
 #include "lib/plane_triangle.glsl"
 #include "lib/plane_tile.glsl"
 
 layout(local_size_x = 1) in;
 
 uniform int after_stage;  // 0: nothing yet, 1: setup, 2: tiles
-uniform int room;         // of Entries
+uniform int room;         // of the entries
 
 const uint GROUPS = 65535u;  // in one direction, as many as every device has
 

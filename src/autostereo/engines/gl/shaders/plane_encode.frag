@@ -12,13 +12,12 @@
 #include "lib/texture.glsl"
 #endif
 #include "lib/surface.glsl"
+#include "lib/plane_surface.glsl"
 
-layout(std430, binding = 3) readonly buffer Depths { uint depths[]; };
-layout(std430, binding = 4) readonly buffer Winners { uint winners[]; };
-layout(std430, binding = 7) readonly buffer CameraOffsets { float camera_offset[]; };
-layout(std430, binding = 8) readonly buffer Points { vec4 points[]; };
-layout(std430, binding = 9) readonly buffer Indices { uint indices[]; };
-layout(std430, binding = 10) readonly buffer Surfaces { Surface surfaces[]; };
+layout(rgba32ui, binding = 1) readonly uniform uimage2D corners;  // three vertices of each triangle
+layout(r32ui, binding = 2) readonly uniform uimage2D depths;
+layout(r32ui, binding = 3) readonly uniform uimage2D winners;
+layout(r32f, binding = 5) readonly uniform image2D camera_offset;
 
 uniform ivec2 picture;       // width; rows of this round
 uniform int first_row;
@@ -38,20 +37,25 @@ void main() {
     if (row < 0 || row >= picture.y) {
         discard;
     }
-    int at = ((tile - first_tile) * picture.y + row) * picture.x + pixel.x;
-    uint number = winners[at] - uint(range.x);
+    ivec2 at = place_of(uint(((tile - first_tile) * picture.y + row) * picture.x + pixel.x));
+    uint number = imageLoad(winners, at).x - uint(range.x);
     if (number >= uint(range.y)) {
         discard;
     }
 #ifdef PANEL
-    float v = camera_offset[at];
+    float v = imageLoad(camera_offset, at).x;
     vec3 ray = ray_direction(vec2(pixel) + vec2(sample_at[first_channel + tile], sample_at.w), v);
 #else
     float v = views[tile].x;
     vec3 ray = ray_direction(vec2(pixel) + sample_at.xw, v);
 #endif
-    uvec3 corner = uvec3(indices[3u * number], indices[3u * number + 1u], indices[3u * number + 2u]);
-    vec3 p[3] = vec3[3](points[corner.x].xyz, points[corner.y].xyz, points[corner.z].xyz);
+    uvec4 corner = imageLoad(corners, place_of(number));
+    vec3 p[3];
+    Surface surface[3];
+    for (int k = 0; k < 3; ++k) {
+        p[k] = imageLoad(points, place_of(corner[k])).xyz;
+        surface[k] = load_surface(corner[k]);
+    }
     vec3 eye = vec3(v, lens.w, 0.0), e, e_dx, e_dy;
     for (int k = 0; k < 3; ++k) {
         vec3 i = p[(k + 1) % 3] - eye, j = p[(k + 2) % 3] - eye, n = cross(i + j, j - i);
@@ -64,13 +68,12 @@ void main() {
     vec3 w = max(e / total, 0.0);  // snapping moves edges: a sample may be beyond
     w /= max(w.x + w.y + w.z, TINY);
     vec3 point = w.x * p[0] + w.y * p[1] + w.z * p[2];
-    Surface corners[3] = Surface[3](surfaces[corner.x], surfaces[corner.y], surfaces[corner.z]);
-    Surface s = mixed(corners, w, point);
+    Surface s = mixed(surface, w, point);
     vec3 paint = vec3(1.0);
 #ifdef TEXTURED
     vec3 w_dx = (e_dx - w * (e_dx.x + e_dx.y + e_dx.z)) / total, w_dy = (e_dy - w * (e_dy.x + e_dy.y + e_dy.z)) / total;
-    paint = trilinear(s.uv, uv_of(corners, w_dx), uv_of(corners, w_dy));
+    paint = trilinear(s.uv, uv_of(surface, w_dx), uv_of(surface, w_dy));
 #endif
     color = vec4(quantized(surface_color(s, total > 0.0, v, paint)), 1.0);
-    gl_FragDepth = uintBitsToFloat(depths[at]);
+    gl_FragDepth = uintBitsToFloat(imageLoad(depths, at).x);
 }

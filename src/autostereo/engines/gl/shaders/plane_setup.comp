@@ -1,18 +1,18 @@
 // Stage 1: primitive setup (PMR 2020, section 4.1): clip at the near plane, project, snap, cull over the union of all views.
 #include "lib/frame.glsl"
+#include "lib/plane_memory.glsl"
 #include "lib/plane_triangle.glsl"
 #include "lib/plane_tile.glsl"
 
 layout(local_size_x = 64) in;
 
-layout(std430, binding = 8) readonly buffer Points { vec4 points[]; };  // eye space
-layout(std430, binding = 9) readonly buffer Indices { uint indices[]; };
+layout(rgba32ui, binding = 1) readonly uniform uimage2D corners;  // three vertices of each triangle of the part
 
 uniform ivec2 range;         // of the part's triangles: first, how many
 uniform int first_triangle;  // number in the scene of the part's first
 uniform bool two_sided;
 uniform vec2 reach;          // least and greatest camera offset of this pass
-uniform int room;            // of Triangles
+uniform int room;            // of the triangles
 
 const float SNAP = 256.0;         // steps of a pixel
 const float FAR_OUT = 1e9;        // pixels that still are whole numbers of 32 bits
@@ -59,7 +59,10 @@ void emit(vec4 a, vec4 b, vec4 c, uint number) {
                      max(right.x, max(right.y, right.z)) - min(right.x, min(right.y, right.z)));
     bool large = (min(max(wide.x, wide.y), float(picture.x)) / 4.0 + 1.0) * ((last - first) / 4.0 + 1.0) > LARGE_TILES;
     uint slot = large ? uint(room) - 1u - atomicAdd(large_triangles, 1u) : atomicAdd(small_triangles, 1u);
-    triangles[slot] = t;
+    for (int k = 0; k < 3; ++k) {
+        imageStore(triangles, place_of(4u * slot + uint(k)), t.corner[k]);
+    }
+    imageStore(triangles, place_of(4u * slot + 3u), uintBitsToFloat(t.info));
 }
 
 void main() {
@@ -70,10 +73,11 @@ void main() {
     k += uint(range.x);
     uint number = uint(first_triangle) + k;
     float near = depth_range.z;
+    uvec4 vertex = imageLoad(corners, place_of(k));
     vec3 corner[3];
     int before = 0;
     for (int i = 0; i < 3; ++i) {
-        corner[i] = points[indices[3u * k + uint(i)]].xyz;
+        corner[i] = imageLoad(points, place_of(vertex[i])).xyz;
         before += corner[i].z >= near ? 0 : 1;
     }
     if (before == 0) {

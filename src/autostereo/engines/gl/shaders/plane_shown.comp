@@ -1,12 +1,10 @@
 // Which sub-pixels of each tile of a panel show which block of views, and every sub-pixel's camera offset.
 #include "lib/frame.glsl"
+#include "lib/plane_memory.glsl"
 #include "lib/viewmap.glsl"
 #include "lib/cameras.glsl"
 
 layout(local_size_x = 64) in;
-
-layout(std430, binding = 6) buffer Shown { uvec2 shown[]; };                            // as lib/plane_tile.glsl
-layout(std430, binding = 7) writeonly buffer CameraOffsets { float camera_offset[]; };
 
 uniform ivec2 picture;   // width; rows of this round
 uniform int first_row;
@@ -21,7 +19,7 @@ void main() {
     }
     ivec2 corner = 4 * ivec2(k % tiles.x, k / tiles.x);
     for (int b = 0; b < grouping.y; ++b) {
-        shown[k * grouping.y + b] = uvec2(0u);
+        imageStore(shown, place_of(uint(k * grouping.y + b)), uvec4(0u));
     }
     for (int i = 0; i < 16; ++i) {
         ivec2 pixel = corner + ivec2(i & 3, i >> 2);
@@ -33,8 +31,10 @@ void main() {
         vec3 offset = offsets_of_subpixels(at.x, at.y);
         for (int c = planes.x; c < planes.x + planes.y; ++c) {
             uvec2 bit = c < 2 ? uvec2(1u << (16 * c + i), 0u) : uvec2(0u, 1u << i);
-            shown[k * grouping.y + block[c]] |= bit;
-            camera_offset[((c - planes.x) * picture.y + pixel.y) * picture.x + pixel.x] = offset[c];
+            ivec2 place = place_of(uint(k * grouping.y + block[c]));
+            imageStore(shown, place, imageLoad(shown, place) | uvec4(bit, 0u, 0u));
+            int sample_number = ((c - planes.x) * picture.y + pixel.y) * picture.x + pixel.x;
+            imageStore(camera_offset, place_of(uint(sample_number)), vec4(offset[c]));
         }
     }
 }

@@ -5,13 +5,14 @@
 // many, those not wholly outside one of the three side faces. Tiles go to the queue; one that finds no room there is
 // rasterised at once, and `everything` repeats that for the second round.
 #include "lib/frame.glsl"
+#include "lib/plane_memory.glsl"
 #include "lib/plane_triangle.glsl"
 #include "lib/plane_tile.glsl"
 
 layout(local_size_x = 64) in;
 
-uniform int room;              // of Entries
-uniform int triangle_room;     // of Triangles
+uniform int room;              // of the entries
+uniform int triangle_room;     // of the triangles
 uniform bool large;            // triangles of many tiles: sixteen rows an invocation
 uniform bool everything;       // rasterise all tiles here
 
@@ -54,7 +55,7 @@ void main() {
         return;
     }
     uint slot = large ? uint(triangle_room) - 1u - k : k;
-    Triangle t = triangles[slot];
+    Triangle t = triangle_at(slot);
     int layers = (pass_views.y + 3) / 4, layer = int(gl_WorkGroupID.z) % layers;
     ivec2 rows = ivec2(t.info.zw) >> 2;
     if (large) {
@@ -72,7 +73,7 @@ void main() {
     ivec4 first = ivec4(1 << 20), last = ivec4(-1);
     vec2 reach[4];
     for (int b = 0; b < min(4, pass_views.y - 4 * layer); ++b) {
-        reach[b] = blocks[pass_views.x + 4 * layer + b].reach.xy;
+        reach[b] = imageLoad(blocks, ivec2(1, pass_views.x + 4 * layer + b)).xy;
         vec3 low = min(x + reach[b].x * p, x + reach[b].y * p), high = max(x + reach[b].x * p, x + reach[b].y * p);
         int column = max(clamped(ceil(min(low.x, min(low.y, low.z)) - late), picture.x), 0);
         int end = clamped(floor(max(high.x, max(high.y, high.z)) - early), picture.x - 1);
@@ -117,9 +118,10 @@ void main() {
                 int bit = next_bit(mask);
                 ivec3 tile = corner + ivec3(bit & 3, (bit >> 2) & 3, bit >> 4);
                 if (at < uint(room)) {
-                    entries[at++] = uvec2(slot, uint(tile.x) | uint(tile.y) << 12 | uint(tile.z) << 24);
+                    uint place = uint(tile.x) | uint(tile.y) << 12 | uint(tile.z) << 24;
+                    imageStore(entries, place_of(at++), uvec4(slot, place, 0u, 0u));
                 } else {
-                    raster_tile(t, tile);
+                    put_tile(t, tile, coverage(t, tile));
                 }
             }
         }

@@ -2,13 +2,11 @@
 #include "lib/frame.glsl"
 #include "lib/shading.glsl"
 #include "lib/surface.glsl"
+#include "lib/plane_surface.glsl"
 
 layout(local_size_x = 64) in;
 
-layout(std430, binding = 11) readonly buffer Vertices { float vertices[]; };
-layout(std430, binding = 8) writeonly buffer Points { vec4 points[]; };
-layout(std430, binding = 10) writeonly buffer Surfaces { Surface surfaces[]; };
-
+layout(std430, binding = 1) readonly buffer Vertices { float vertices[]; };
 uniform int count;
 
 const int SIZE =
@@ -32,6 +30,6 @@ void main() {
     uv = vec2(vertices[at + 9], vertices[at + 10]);
 #endif
     vec3 point = (eye_from_local * vec4(position, 1.0)).xyz;
-    points[k] = vec4(point, 0.0);
-    surfaces[k] = surface_at(point, mat3(eye_from_local) * normal, color, uv);
+    imageStore(points, place_of(uint(k)), vec4(point, 0.0));
+    store_surface(uint(k), surface_at(point, mat3(eye_from_local) * normal, color, uv));
 }

@@ -1,35 +1,19 @@
 // The fine rasteriser: a tile of 4 x 4 pixels and up to 4 views, voxel by voxel (PMR 2020, section 4.3).
 //
 // There are two rounds, as not every device has atomic operations of 64 bits: `find_depth` leaves the least depth in every
-// voxel, the next round the first triangle of that depth. Needs frame.glsl, plane_triangle.glsl.
+// voxel, the next round the first triangle of that depth. Needs frame.glsl, plane_memory.glsl, plane_triangle.glsl.
 //
 // Switches: PANEL: what counts are not voxels but the sub-pixels of a panel, each of which shows one camera; STAGGER: triangles
 // begin with different views, so that at one time they change different addresses (section 4.3).
 
-layout(std430, binding = 0) buffer Triangles { Triangle triangles[]; };
-layout(std430, binding = 1) buffer Entries { uvec2 entries[]; };  // triangle; tile's column, row, block, in 12, 12, 8 bits
-layout(std430, binding = 2) buffer Counters {
-    uint small_triangles;     // from the front of Triangles
-    uint large_triangles;     // from its end
+layout(std430, binding = 0) buffer Counters {
+    uint small_triangles;     // from the front of the triangles
+    uint large_triangles;     // from their end
     uint entry_count;         // asked for, also beyond the room there is
     uint most_entries;        // that a pass asked for since last read
     uint unused[4];
     uint dispatch[5 * 3];     // tiles of small, of large triangles; entries; small, large triangles once more
 };
-layout(std430, binding = 3) buffer Depths { uint depths[]; };    // per voxel, or sub-pixel: bits of window depth
-layout(std430, binding = 4) buffer Winners { uint winners[]; };  // number of the triangle that is seen
-
-// Views of a tile: consecutive ones, and the camera offsets between which they lie.
-struct Block {
-    vec4 offset;
-    vec4 reach;
-};
-layout(std430, binding = 5) buffer Blocks { Block blocks[]; };
-
-#ifdef PANEL
-layout(std430, binding = 6) buffer Shown { uvec2 shown[]; };                  // per tile and block: bits c*16 + y*4 + x
-layout(std430, binding = 7) buffer CameraOffsets { float camera_offset[]; };  // per sub-pixel
-#endif
 
 uniform ivec2 picture;     // width; rows of this round
 uniform int first_row;     // of this round
@@ -37,6 +21,15 @@ uniform ivec4 pass_views;  // first block, blocks of this pass; views per block;
 uniform vec4 sample_at;    // where in a pixel samples are: x of three channels, y
 uniform ivec2 planes;      // first channel and how many of them
 uniform bool find_depth;
+
+Triangle triangle_at(uint slot) {
+    Triangle t;
+    for (int k = 0; k < 3; ++k) {
+        t.corner[k] = imageLoad(triangles, place_of(4u * slot + uint(k)));
+    }
+    t.info = floatBitsToUint(imageLoad(triangles, place_of(4u * slot + 3u)));
+    return t;
+}
 
 // Bits of window depth at (x, y, v); none if the triangle is seen from its edge.
 uint depth_bits(Triangle t, float x, float y, float v) {
@@ -59,10 +52,11 @@ uint depth_bits(Triangle t, float x, float y, float v) {
 }
 
 void put(uint number, int at, uint bits) {
+    ivec2 place = place_of(uint(at));
     if (find_depth) {
-        atomicMin(depths[at], bits);
-    } else if (depths[at] == bits) {
-        atomicMin(winners[at], number);
+        imageAtomicMin(depths, place, bits);
+    } else if (imageLoad(depths, place).x == bits) {
+        imageAtomicMin(winners, place, number);
     }
 }
 
@@ -79,34 +73,45 @@ int next_bit(inout uvec2 mask) {
 }
 
 #ifdef PANEL
-void raster_tile(Triangle t, ivec3 tile) {
+// Coverage mask of a tile: those sub-pixels, bit c*16 + y*4 + x, that show a camera of the block and see the triangle.
+uvec2 coverage(Triangle t, ivec3 tile) {
     int tiles_across = (picture.x + 3) >> 2, all_blocks = (pass_views.w + pass_views.z - 1) / pass_views.z;
-    uvec2 mask = shown[(tile.y * tiles_across + tile.x) * all_blocks + pass_views.x + tile.z];
-    if (mask == uvec2(0u)) {
-        return;
-    }
+    int entry = (tile.y * tiles_across + tile.x) * all_blocks + pass_views.x + tile.z;
+    uvec2 left = imageLoad(shown, place_of(uint(entry))).xy, mask = uvec2(0u);
     Edge e[3] = Edge[3](edge_of(t, 0), edge_of(t, 1), edge_of(t, 2));
     bool both = (t.info.y & BOTH_SIDES) != 0u;
-    while (mask != uvec2(0u)) {
-        int bit = next_bit(mask), plane = (bit >> 4) - planes.x;
+    while (left != uvec2(0u)) {
+        uvec2 with = left;
+        int bit = next_bit(left);
         ivec2 pixel = 4 * tile.xy + ivec2(bit & 3, (bit >> 2) & 3);
-        if (plane < 0 || plane >= planes.y) {
-            continue;
-        }
-        int at = (plane * picture.y + pixel.y) * picture.x + pixel.x;
-        float v = camera_offset[at];
         vec2 place = vec2(pixel.x, pixel.y + first_row) + vec2(sample_at[bit >> 4], sample_at.w);
+        int at = (((bit >> 4) - planes.x) * picture.y + pixel.y) * picture.x + pixel.x;
+        float v = imageLoad(camera_offset, place_of(uint(at))).x;
         if ((covered(e, both, vec4(place.x), place.y, v) & 1u) != 0u) {
-            put(t.info.x, at, depth_bits(t, place.x, place.y, v));
+            mask |= with ^ left;
         }
+    }
+    return mask;
+}
+
+void put_tile(Triangle t, ivec3 tile, uvec2 mask) {
+    while (mask != uvec2(0u)) {
+        int bit = next_bit(mask);
+        ivec2 pixel = 4 * tile.xy + ivec2(bit & 3, (bit >> 2) & 3);
+        int at = (((bit >> 4) - planes.x) * picture.y + pixel.y) * picture.x + pixel.x;
+        float v = imageLoad(camera_offset, place_of(uint(at))).x;
+        vec2 place = vec2(pixel.x, pixel.y + first_row) + vec2(sample_at[bit >> 4], sample_at.w);
+        put(t.info.x, at, depth_bits(t, place.x, place.y, v));
     }
 }
 #else
 // Coverage mask of a tile: bit v*16 + y*4 + x.
-uvec2 coverage(Triangle t, ivec3 tile, int views) {
+uvec2 coverage(Triangle t, ivec3 tile) {
     Edge e[3] = Edge[3](edge_of(t, 0), edge_of(t, 1), edge_of(t, 2));
     bool both = (t.info.y & BOTH_SIDES) != 0u;
-    vec4 offset = blocks[pass_views.x + tile.z].offset;
+    int block = pass_views.x + tile.z;
+    int views = min(pass_views.z, pass_views.w - block * pass_views.z);
+    vec4 offset = imageLoad(blocks, ivec2(0, block));
     vec4 x = float(4 * tile.x) + sample_at.x + vec4(0.0, 1.0, 2.0, 3.0);
     uint columns = (1u << min(4, picture.x - 4 * tile.x)) - 1u;
     int top = max(4 * tile.y, int(t.info.z)), bottom = min(4 * tile.y + 3, int(t.info.w));
@@ -121,11 +126,9 @@ uvec2 coverage(Triangle t, ivec3 tile, int views) {
     return mask;
 }
 
-void raster_tile(Triangle t, ivec3 tile) {
+void put_tile(Triangle t, ivec3 tile, uvec2 mask) {
     int first = tile.z * pass_views.z;
-    int views = min(pass_views.z, pass_views.w - pass_views.x * pass_views.z - first);
-    vec4 offset = blocks[pass_views.x + tile.z].offset;
-    uvec2 mask = coverage(t, tile, views);
+    vec4 offset = imageLoad(blocks, ivec2(0, pass_views.x + tile.z));
 #ifdef STAGGER
     uint turned = t.info.x & 3u;  // begin with this view: 16 bits each
     mask = (turned & 2u) != 0u ? mask.yx : mask;
