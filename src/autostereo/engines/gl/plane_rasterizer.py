@@ -171,7 +171,7 @@ class Drawing:
     # --- stages ----------------------------------------------------------------------------------------------
 
     def _clear(self, part: Round) -> None:
-        samples = part.width * part.rows * part.planes
+        samples = 16 * part.tiles * part.planes
         voxels = self.job.kept.get("plane voxels", samples, lambda: Voxels(self.job.device, samples))
         with _stage(self.job, "clear"):
             voxels.clear()
@@ -191,7 +191,7 @@ class Drawing:
     def _find_shown(self, part: Round) -> tuple[Any, Any]:
         job, device = self.job, self.job.device
         shown = Memory(device, part.tiles * len(self.blocks), 2, "u4")
-        offsets = Memory(device, part.width * part.rows * part.planes, 1, "f4")
+        offsets = Memory(device, 16 * part.tiles * part.planes, 1, "f4")
         shown.bind(4)
         offsets.bind(5)
         program = job.masked_program("plane_shown.comp", version=VERSION)
@@ -280,7 +280,7 @@ class Drawing:
                 corners.points.bind(6)
                 corners.surfaces.bind(7)
                 _set(program, picture=(part.width, part.rows), first_row=part.first_row, first_view=tiles.start)
-                _set(program, first_tile=tiles.start, first_channel=job.first, sample_at=self.sample_at)
+                _set(program, first_tile=tiles.start, first_channel=job.first, plane_count=part.planes, sample_at=self.sample_at)
                 _set(program, range=(int(self.numbers[number]), mesh.triangles))
                 job.vertex_array(program, []).render(ctx.TRIANGLE_STRIP, vertices=4, instances=len(tiles))
 

@@ -12,16 +12,15 @@
 #include "lib/texture.glsl"
 #endif
 #include "lib/surface.glsl"
+#include "lib/plane_memory.glsl"
 #include "lib/plane_surface.glsl"
 
 layout(rgba32ui, binding = 1) readonly uniform uimage2D corners;  // three vertices of each triangle
-layout(r32ui, binding = 2) readonly uniform uimage2D depths;
-layout(r32ui, binding = 3) readonly uniform uimage2D winners;
-layout(r32f, binding = 5) readonly uniform image2D camera_offset;
 
 uniform ivec2 picture;       // width; rows of this round
 uniform int first_row;
 uniform int first_tile;      // whose plane is the first
+uniform int plane_count;
 uniform int first_channel;   // of the tiles
 uniform vec4 sample_at;      // x of three channels, y
 uniform ivec2 range;         // numbers of the part's triangles: first, how many
@@ -37,7 +36,7 @@ void main() {
     if (row < 0 || row >= picture.y) {
         discard;
     }
-    ivec2 at = place_of(uint(((tile - first_tile) * picture.y + row) * picture.x + pixel.x));
+    ivec2 at = place_of(sample_number(ivec2(pixel.x, row), tile - first_tile, picture.x, plane_count));
     uint number = imageLoad(winners, at).x - uint(range.x);
     if (number >= uint(range.y)) {
         discard;

@@ -18,10 +18,11 @@ const float SNAP = 256.0;         // steps of a pixel
 const float FAR_OUT = 1e9;        // pixels that still are whole numbers of 32 bits
 const float LARGE_TILES = 256.0;  // more than these are looked at by many invocations
 
-// Position at offset 0, snapped; change per offset; 1/depth.
+// Position at offset 0, snapped; change per offset; window depth.
 vec4 projected(vec3 p) {
     precise vec2 at = floor(picture_times_depth(p, 0.0) / p.z * SNAP + 0.5) / SNAP;
-    return vec4(clamp(at, -FAR_OUT, FAR_OUT), lens.x * (depth_range.w - 1.0 / p.z), 1.0 / p.z);
+    return vec4(clamp(at, -FAR_OUT, FAR_OUT), lens.x * (depth_range.w - 1.0 / p.z),
+                clamp(window_from_depth(p.z), 0.0, 1.0));
 }
 
 bool after(vec3 a, vec3 b) {

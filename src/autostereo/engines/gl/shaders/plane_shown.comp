@@ -33,8 +33,7 @@ void main() {
             uvec2 bit = c < 2 ? uvec2(1u << (16 * c + i), 0u) : uvec2(0u, 1u << i);
             ivec2 place = place_of(uint(k * grouping.y + block[c]));
             imageStore(shown, place, imageLoad(shown, place) | uvec4(bit, 0u, 0u));
-            int sample_number = ((c - planes.x) * picture.y + pixel.y) * picture.x + pixel.x;
-            imageStore(camera_offset, place_of(uint(sample_number)), vec4(offset[c]));
+            imageStore(camera_offset, place_of(sample_number(pixel, c - planes.x, picture.x, planes.y)), vec4(offset[c]));
         }
     }
 }

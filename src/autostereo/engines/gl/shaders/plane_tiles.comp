@@ -37,8 +37,9 @@ bool may_cover(Edge e[3], bool both, ivec2 tile, vec2 reach) {
     bool front = true, back = both;
     for (int k = 0; k < 3; ++k) {
         float most = -1e38, least = 1e38;
+        vec2 low = edge_in_view(e[k], reach.x), high = edge_in_view(e[k], reach.y);
         for (int i = 0; i < 8; ++i) {
-            vec2 part = terms(e[k], (i & 1) == 0 ? x0 : x1, (i & 2) == 0 ? y0 : y0 + 3.0, (i & 4) == 0 ? reach.x : reach.y);
+            vec2 part = terms(e[k], (i & 4) == 0 ? low : high, (i & 1) == 0 ? x0 : x1, (i & 2) == 0 ? y0 : y0 + 3.0);
             float value = part.x + part.y, slack = ROUNDING * (abs(part.x) + abs(part.y));
             most = max(most, value + slack);
             least = min(least, value - slack);

@@ -2,6 +2,7 @@
 #include "lib/frame.glsl"
 #include "lib/shading.glsl"
 #include "lib/surface.glsl"
+#include "lib/plane_memory.glsl"
 #include "lib/plane_surface.glsl"
 
 layout(local_size_x = 64) in;

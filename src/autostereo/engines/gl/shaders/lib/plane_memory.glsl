@@ -13,3 +13,9 @@ layout(rgba32f, binding = 7) uniform image2D blocks;       // row b: offsets of 
 ivec2 place_of(uint i) {
     return ivec2(i % MEMORY_WIDTH, i / MEMORY_WIDTH);
 }
+
+// Number of a sample in a round: the 16 pixels of a tile lie together, and a tile's planes (views, or channels of a panel).
+uint sample_number(ivec2 pixel, int plane, int width, int plane_count) {
+    ivec2 tile = pixel >> 2;
+    return uint(((tile.y * ((width + 3) >> 2) + tile.x) * plane_count + plane) * 16 + 4 * (pixel.y & 3) + (pixel.x & 3));
+}

@@ -1,11 +1,7 @@
-// A part's vertices in eye space, as the plane rasteriser keeps them between its first and last stage. Needs surface.glsl.
+// A part's vertices in eye space, as the plane rasteriser keeps them between its first and last stage. Needs surface.glsl,
+// plane_memory.glsl.
 
-layout(rgba32f, binding = 6) uniform image2D points;
 layout(rgba32f, binding = 7) uniform image2D surfaces;  // SURFACE_TEXELS texels each
-
-ivec2 place_of(uint i) {
-    return ivec2(i % MEMORY_WIDTH, i / MEMORY_WIDTH);
-}
 
 const uint SURFACE_TEXELS = 4u;
 

@@ -31,28 +31,34 @@ Triangle triangle_at(uint slot) {
     return t;
 }
 
-// Bits of window depth at (x, y, v); none if the triangle is seen from its edge.
-uint depth_bits(Triangle t, float x, float y, float v) {
+// Window depth in view v: where corner 0 is, what is gained per pixel to the right and down, and least and greatest.
+struct Depth {
+    vec3 start;
+    vec2 gain;
+    vec2 range;
+    bool none;   // seen from its edge
+};
+
+Depth depth_of(Triangle t, float v) {
     precise vec3 xs = vec3(t.corner[0].x, t.corner[1].x, t.corner[2].x)
                       + v * vec3(t.corner[0].z, t.corner[1].z, t.corner[2].z);
-    precise vec2 a = vec2(xs.y - xs.x, t.corner[1].y - t.corner[0].y);
-    precise vec2 b = vec2(xs.z - xs.x, t.corner[2].y - t.corner[0].y);
-    precise vec2 q = vec2(x - xs.x, y - t.corner[0].y);
+    precise vec3 a = vec3(xs.y - xs.x, t.corner[1].yw - t.corner[0].yw);
+    precise vec3 b = vec3(xs.z - xs.x, t.corner[2].yw - t.corner[0].yw);
     precise float area = a.x * b.y - b.x * a.y;
-    if (area == 0.0) {
-        return 0xffffffffu;
-    }
-    vec3 near = vec3(t.corner[0].w, t.corner[1].w, t.corner[2].w);
-    precise float s = (q.x * b.y - b.x * q.y) / area;
-    precise float r = (a.x * q.y - q.x * a.y) / area;
-    precise float inverse = near.x + s * (near.y - near.x) + r * (near.z - near.x);
-    inverse = clamp(inverse, min(near.x, min(near.y, near.z)), max(near.x, max(near.y, near.z)));
-    precise float window_depth = (depth_range.x - inverse) / depth_range.y;
-    return floatBitsToUint(clamp(window_depth, 0.0, 1.0));
+    precise float right = (a.z * b.y - b.z * a.y) / area, down = (a.x * b.z - b.x * a.z) / area;
+    vec3 z = vec3(t.corner[0].w, t.corner[1].w, t.corner[2].w);
+    vec2 range = vec2(min(z.x, min(z.y, z.z)), max(z.x, max(z.y, z.z)));
+    return Depth(vec3(xs.x, t.corner[0].y, z.x), vec2(right, down), range, area == 0.0);
 }
 
-void put(uint number, int at, uint bits) {
-    ivec2 place = place_of(uint(at));
+// Its bits at (x, y). Rounding must not lead out of the triangle.
+uint depth_bits(Depth d, float x, float y) {
+    precise float z = d.start.z + d.gain.x * (x - d.start.x) + d.gain.y * (y - d.start.y);
+    return floatBitsToUint(clamp(z, d.range.x, d.range.y));
+}
+
+void put(uint number, uint at, uint bits) {
+    ivec2 place = place_of(at);
     if (find_depth) {
         imageAtomicMin(depths, place, bits);
     } else if (imageLoad(depths, place).x == bits) {
@@ -73,7 +79,23 @@ int next_bit(inout uvec2 mask) {
 }
 
 #ifdef PANEL
-// Coverage mask of a tile: those sub-pixels, bit c*16 + y*4 + x, that show a camera of the block and see the triangle.
+// A sub-pixel of a tile: bit c*16 + y*4 + x. Its number, its place, and its camera's offset.
+struct SubPixel {
+    uint number;
+    vec2 place;
+    float offset;
+};
+
+SubPixel sub_pixel(ivec3 tile, int bit) {
+    int c = bit >> 4;
+    ivec2 pixel = 4 * tile.xy + ivec2(bit & 3, (bit >> 2) & 3);
+    uint number = sample_number(pixel, c - planes.x, picture.x, planes.y);
+    float column = c == 0 ? sample_at.x : c == 1 ? sample_at.y : sample_at.z;
+    vec2 place = vec2(pixel.x, pixel.y + first_row) + vec2(column, sample_at.w);
+    return SubPixel(number, place, imageLoad(camera_offset, place_of(number)).x);
+}
+
+// Coverage mask of a tile: those sub-pixels that show a camera of the block and see the triangle.
 uvec2 coverage(Triangle t, ivec3 tile) {
     int tiles_across = (picture.x + 3) >> 2, all_blocks = (pass_views.w + pass_views.z - 1) / pass_views.z;
     int entry = (tile.y * tiles_across + tile.x) * all_blocks + pass_views.x + tile.z;
@@ -82,33 +104,30 @@ uvec2 coverage(Triangle t, ivec3 tile) {
     bool both = (t.info.y & BOTH_SIDES) != 0u;
     while (left != uvec2(0u)) {
         uvec2 with = left;
-        int bit = next_bit(left);
-        ivec2 pixel = 4 * tile.xy + ivec2(bit & 3, (bit >> 2) & 3);
-        vec2 place = vec2(pixel.x, pixel.y + first_row) + vec2(sample_at[bit >> 4], sample_at.w);
-        int at = (((bit >> 4) - planes.x) * picture.y + pixel.y) * picture.x + pixel.x;
-        float v = imageLoad(camera_offset, place_of(uint(at))).x;
-        if ((covered(e, both, vec4(place.x), place.y, v) & 1u) != 0u) {
-            mask |= with ^ left;
+        SubPixel s = sub_pixel(tile, next_bit(left));
+        bvec3 is_before;
+        for (int k = 0; k < 3; ++k) {
+            is_before[k] = before(e[k], edge_in_view(e[k], s.offset), s.place.x, s.place.y);
         }
+        mask |= all(is_before) || (both && !any(is_before)) ? with ^ left : uvec2(0u);
     }
     return mask;
 }
 
 void put_tile(Triangle t, ivec3 tile, uvec2 mask) {
     while (mask != uvec2(0u)) {
-        int bit = next_bit(mask);
-        ivec2 pixel = 4 * tile.xy + ivec2(bit & 3, (bit >> 2) & 3);
-        int at = (((bit >> 4) - planes.x) * picture.y + pixel.y) * picture.x + pixel.x;
-        float v = imageLoad(camera_offset, place_of(uint(at))).x;
-        vec2 place = vec2(pixel.x, pixel.y + first_row) + vec2(sample_at[bit >> 4], sample_at.w);
-        put(t.info.x, at, depth_bits(t, place.x, place.y, v));
+        SubPixel s = sub_pixel(tile, next_bit(mask));
+        Depth d = depth_of(t, s.offset);
+        if (!d.none) {
+            put(t.info.x, s.number, depth_bits(d, s.place.x, s.place.y));
+        }
     }
 }
 #else
 // Coverage mask of a tile: bit v*16 + y*4 + x.
 uvec2 coverage(Triangle t, ivec3 tile) {
-    Edge e[3] = Edge[3](edge_of(t, 0), edge_of(t, 1), edge_of(t, 2));
-    bool both = (t.info.y & BOTH_SIDES) != 0u;
+    Edge e0 = edge_of(t, 0), e1 = edge_of(t, 1), e2 = edge_of(t, 2);
+    uint both = (t.info.y & BOTH_SIDES) != 0u ? 15u : 0u;
     int block = pass_views.x + tile.z;
     int views = min(pass_views.z, pass_views.w - block * pass_views.z);
     vec4 offset = imageLoad(blocks, ivec2(0, block));
@@ -117,32 +136,44 @@ uvec2 coverage(Triangle t, ivec3 tile) {
     int top = max(4 * tile.y, int(t.info.z)), bottom = min(4 * tile.y + 3, int(t.info.w));
     uvec2 mask = uvec2(0u);
     for (int k = 0; k < views; ++k) {
+        vec2 in0 = edge_in_view(e0, offset.x), in1 = edge_in_view(e1, offset.x), in2 = edge_in_view(e2, offset.x);
+        offset = offset.yzwx;
+        uint found = 0u;
         for (int row = top; row <= bottom; ++row) {
-            uint bits = covered(e, both, x, float(row + first_row) + sample_at.w, offset[k]) & columns;
-            bits <<= 4 * (row & 3) + 16 * (k & 1);
-            mask |= k < 2 ? uvec2(bits, 0u) : uvec2(0u, bits);
+            float y = float(row + first_row) + sample_at.w;
+            uint a = columns_before(e0, in0, x, y), b = columns_before(e1, in1, x, y), c = columns_before(e2, in2, x, y);
+            found |= (((a & b & c) | (both & ~(a | b | c))) & columns) << 4 * (row & 3);
         }
+        found <<= 16 * (k & 1);
+        mask |= k < 2 ? uvec2(found, 0u) : uvec2(0u, found);
     }
     return mask;
 }
 
 void put_tile(Triangle t, ivec3 tile, uvec2 mask) {
-    int first = tile.z * pass_views.z;
-    vec4 offset = imageLoad(blocks, ivec2(0, pass_views.x + tile.z));
+    int first = tile.z * pass_views.z, block = pass_views.x + tile.z;
+    int views = min(pass_views.z, pass_views.w - block * pass_views.z);
+    vec4 offset = imageLoad(blocks, ivec2(0, block));
+    vec2 corner = vec2(4 * tile.x, 4 * tile.y + first_row) + sample_at.xw;
+    for (int i = 0; i < views; ++i) {
 #ifdef STAGGER
-    uint turned = t.info.x & 3u;  // begin with this view: 16 bits each
-    mask = (turned & 2u) != 0u ? mask.yx : mask;
-    mask = (turned & 1u) != 0u ? (mask >> 16) | (mask.yx << 16) : mask;
+        int k = (i + int(t.info.x)) % views;
+        float v = offset[k];
+#else
+        int k = i;
+        float v = offset.x;
+        offset = offset.yzwx;
 #endif
-    while (mask != uvec2(0u)) {
-        int bit = next_bit(mask);
-#ifdef STAGGER
-        bit = (bit + 16 * int(turned)) & 63;
-#endif
-        ivec2 pixel = 4 * tile.xy + ivec2(bit & 3, (bit >> 2) & 3);
-        int at = ((first + (bit >> 4)) * picture.y + pixel.y) * picture.x + pixel.x;
-        vec2 place = vec2(pixel.x, pixel.y + first_row) + sample_at.xw;
-        put(t.info.x, at, depth_bits(t, place.x, place.y, offset[bit >> 4]));
+        uint bits = ((k < 2 ? mask.x : mask.y) >> (16 * (k & 1))) & 0xffffu;
+        Depth d = depth_of(t, v);
+        bits = d.none ? 0u : bits;
+        uint start = sample_number(4 * tile.xy, first + k, picture.x, planes.y);
+        while (bits != 0u) {
+            int bit = findLSB(bits);
+            bits &= bits - 1u;
+            ivec2 at = ivec2(bit & 3, bit >> 2);
+            put(t.info.x, start + uint(bit), depth_bits(d, corner.x + float(at.x), corner.y + float(at.y)));
+        }
     }
 }
 #endif

@@ -10,7 +10,7 @@
 // Switch: PLANAR.
 
 struct Triangle {
-    vec4 corner[3];  // x at offset 0 and y, in pixels, snapped; x's change per camera offset; 1/depth. Fronts: clockwise
+    vec4 corner[3];  // x at offset 0 and y, in pixels, snapped; x's change per camera offset; window depth. Fronts: clockwise
     uvec4 info;      // number in the scene; bits 0-2: edge is walked backwards, 3: two-sided; first row, last row
 };
 
@@ -18,8 +18,8 @@ const uint BOTH_SIDES = 8u;
 
 struct Edge {
     vec3 start;   // x, y, p
-    vec3 step;    // to the other end
-    float turn;   // -1: walked backwards
+    vec3 step;    // to the other end; backwards edges: of both signs changed, so that E is what it is forwards
+    float slope;  // dE/dx = yA - yB
 };
 
 #ifdef PLANAR
@@ -28,55 +28,46 @@ uniform float first_offset;  // of view 0, whose slope the planes have
 
 Edge edge_of(Triangle t, int k) {
     vec3 a = t.corner[(k + 1) % 3].xyz, b = t.corner[(k + 2) % 3].xyz;
-    bool back = ((t.info.y >> k) & 1u) != 0u;
-    precise vec3 step = back ? a - b : b - a;
-    return Edge(back ? b : a, step, back ? -1.0 : 1.0);
+    precise vec3 step = b - a;  // exactly opposite if walked backwards, and so is E
+    return Edge(((t.info.y >> k) & 1u) != 0u ? b : a, step, -step.y);
 }
 
-float width_of(Edge e, float v) {
+// Where an edge is in view v: column of its start; dE/dy.
+vec2 edge_in_view(Edge e, float v) {
+    precise float column = e.start.x + v * e.start.z;
 #ifdef PLANAR
     precise float width = e.step.x + first_offset * e.step.z;
 #else
     precise float width = e.step.x + v * e.step.z;
 #endif
-    return width;
+    return vec2(column, width);
 }
 
-// The two terms of E at (x, y, v).
-vec2 terms(Edge e, float x, float y, float v) {
-    precise float across = -e.step.y * (x - (e.start.x + v * e.start.z));
-    precise float down = width_of(e, v) * (y - e.start.y);
-    return e.turn * vec2(across, down);
+// The two terms of E at (x, y) in a view.
+vec2 terms(Edge e, vec2 here, float x, float y) {
+    precise vec2 part = vec2(e.slope * (x - here.x), here.y * (y - e.start.y));
+    return part;
 }
 
-// Which of the columns x, row y, are on the inner side (+1: of a front, -1: of a back) of an edge in view v: top-left rule,
-// as engines/reference/mesh.py.
-bvec4 inside(Edge e, float side, vec4 x, float y, float v) {
-    float facing = side * e.turn;
-    precise float along = e.start.x + v * e.start.z;
-    precise float width = width_of(e, v);
-    precise float down = width * (y - e.start.y);
-    precise vec4 value = facing * (-e.step.y * (x - along) + down);
-    bool kept = -facing * e.step.y > 0.0 || (e.step.y == 0.0 && facing * width > 0.0);
-    return kept ? greaterThanEqual(value, vec4(0.0)) : greaterThan(value, vec4(0.0));
+// Whether a sample at E = 0 belongs to the front that lies to the right or below: top-left rule, as engines/reference/mesh.py.
+bool keeps(Edge e, vec2 here) {
+    return e.slope > 0.0 || (e.slope == 0.0 && here.y > 0.0);
 }
 
-const uvec4 COLUMN_BITS = uvec4(1, 2, 4, 8);
+// Whether (x, y) is on the inner side of a front's edge; else it is on the inner side of a back's.
+bool before(Edge e, vec2 here, float x, float y) {
+    precise vec2 part = terms(e, here, x, y);
+    precise float value = part.x + part.y;
+    return keeps(e, here) ? value >= 0.0 : value > 0.0;
+}
 
-// Bits of the columns x, row y, that a triangle covers in view v.
-uint covered(Edge e[3], bool both, vec4 x, float y, float v) {
-    uint front = 15u, back = both ? 15u : 0u;
-    for (int k = 0; k < 3; ++k) {
-        uvec4 bits = uvec4(inside(e[k], 1.0, x, y, v)) * COLUMN_BITS;
-        front &= bits.x | bits.y | bits.z | bits.w;
-    }
-    if (both) {
-        for (int k = 0; k < 3; ++k) {
-            uvec4 bits = uvec4(inside(e[k], -1.0, x, y, v)) * COLUMN_BITS;
-            back &= bits.x | bits.y | bits.z | bits.w;
-        }
-    }
-    return front | back;
+// The same of the columns x as bits.
+uint columns_before(Edge e, vec2 here, vec4 x, float y) {
+    precise float down = here.y * (y - e.start.y);
+    precise vec4 across = e.slope * (x - here.x);
+    precise vec4 value = across + down;
+    uvec4 bits = uvec4(keeps(e, here) ? greaterThanEqual(value, vec4(0.0)) : greaterThan(value, vec4(0.0)));
+    return bits.x | bits.y << 1 | bits.z << 2 | bits.w << 3;
 }
 
 // Twice the area in view v, positive for fronts: S0 + v S1.
