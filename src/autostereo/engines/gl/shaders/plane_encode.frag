@@ -30,17 +30,9 @@ flat in vec2 origin;
 
 layout(location = 0) out vec4 color;
 
-void main() {
-    ivec2 pixel = ivec2(gl_FragCoord.xy - origin);
-    int row = pixel.y - first_row;
-    if (row < 0 || row >= picture.y) {
-        discard;
-    }
-    ivec2 at = place_of(sample_number(ivec2(pixel.x, row), tile - first_tile, picture.x, plane_count));
-    uint number = imageLoad(winners, at).x - uint(range.x);
-    if (number >= uint(range.y)) {
-        discard;
-    }
+const uint NOTHING = 0xffffffffu;
+
+void shade(uint number, ivec2 pixel, ivec2 at) {
 #ifdef PANEL
     float v = imageLoad(camera_offset, at).x;
     vec3 ray = ray_direction(vec2(pixel) + vec2(sample_at[first_channel + tile], sample_at.w), v);
@@ -75,4 +67,20 @@ void main() {
 #endif
     color = vec4(quantized(surface_color(s, total > 0.0, v, paint)), 1.0);
     gl_FragDepth = uintBitsToFloat(imageLoad(depths, at).x);
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy - origin);
+    int row = pixel.y - first_row;
+    uint number = NOTHING;
+    ivec2 at;
+    if (row >= 0 && row < picture.y) {
+        at = place_of(sample_number(ivec2(pixel.x, row), tile - first_tile, picture.x, plane_count));
+        number = imageLoad(winners, at).x - uint(range.x);
+    }
+    if (number < uint(range.y)) {
+        shade(number, pixel, at);
+    } else {
+        discard;  // not before: software devices go on where all of a group are discarded
+    }
 }
