@@ -110,6 +110,7 @@ class GlEngine:
 
         A stage that can follow a change of its objects has `follow(objects)`; others are made anew.
         """
+        prepared.kept.forget("vertex array")  # they hold on to the buffers of stages that are replaced
         with self.device as device:
             stages, old = [], iter(prepared.stages)
             for kind, make in STAGES:
@@ -117,9 +118,12 @@ class GlEngine:
                 if not objects:
                     continue
                 stage, before = next(old), [item for item in prepared.scene.objects if type(item) is kind]
-                if any(a is not b for a, b in zip(objects, before, strict=True)):
-                    stage = stage.follow(objects) if hasattr(stage, "follow") else make(device, objects, prepared.middle)
-                stages.append(stage)
+                if all(a is b for a, b in zip(objects, before, strict=True)):
+                    stages.append(stage)
+                elif hasattr(stage, "follow"):
+                    stages.append(stage.follow(objects))
+                else:
+                    stages.append(make(device, objects, prepared.middle))
             return replace(prepared, scene=scene, stages=stages)
 
     def draw(self, prepared: Prepared, draw: Draw, target: Target) -> None:
