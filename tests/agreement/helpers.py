@@ -19,6 +19,13 @@ RIG = aus.Rig(position=(0, 0, 4), fov_y=40, baseline=1.2, views=5, near=0.2)
 OTHER_ENGINES = [name for name in ENGINES if name != "reference"]
 
 
+def engines_for(*kinds: type) -> list[str]:
+    """The engines that draw all these kinds of objects, beside the reference."""
+    from autostereo.engines.gl.engine import METHODS
+
+    return [name for name in OTHER_ENGINES if name != "gl" or set(kinds) <= set(METHODS)]
+
+
 def need(engine: str) -> str:
     """The engine's name; skips, saying why, where it or the public door is not there."""
     if engine == "gl":

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import autostereo as aus
 from autostereo.scene import samples, shapes
 
-from .helpers import OTHER_ENGINES, need
+from .helpers import engines_for, need
 from .test_points_agreement import clouds
 from .volume_cases import (
     BACKGROUND,
@@ -28,7 +28,7 @@ from .volume_cases import (
     volumes,
 )
 
-pytestmark = pytest.mark.parametrize("engine", OTHER_ENGINES)
+pytestmark = pytest.mark.parametrize("engine", engines_for(aus.Mesh, aus.Points, aus.Volume))
 EXACT = {"volume": "exact"}
 RIG = aus.Rig(position=(0.4, 0.3, 4), fov_y=36, views=5, baseline=1.0)
 

@@ -11,10 +11,10 @@ import autostereo as aus
 from autostereo.scene.samples import surfel_cloud
 from autostereo.transforms import rotation, translation
 
-from .helpers import OTHER_ENGINES, need
+from .helpers import engines_for, need
 from .volume_cases import BACKGROUND, DISCRETE, DISPLAYS, LIGHTS, SIZE, H, W, assert_alike, panel, random, rigs, views
 
-pytestmark = pytest.mark.parametrize("engine", OTHER_ENGINES)
+pytestmark = pytest.mark.parametrize("engine", engines_for(aus.Points))
 SHADINGS = st.sampled_from(["exact", "center"])
 
 

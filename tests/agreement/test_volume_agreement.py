@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import autostereo as aus
 from autostereo.scene import samples
 
-from .helpers import OTHER_ENGINES, need
+from .helpers import engines_for, need
 from .volume_cases import (
     DISCRETE,
     DISPLAYS,
@@ -29,7 +29,7 @@ from .volume_cases import (
     views,
 )
 
-pytestmark = pytest.mark.parametrize("engine", OTHER_ENGINES)
+pytestmark = pytest.mark.parametrize("engine", engines_for(aus.Volume))
 STEPS = st.sampled_from([0.5, 1.0, 2.0])
 EXACT = {"volume": "exact"}
 

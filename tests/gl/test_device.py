@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -78,6 +79,24 @@ def test_a_renderer_leaves_nothing_behind(method):
         assert live_objects() == before
     finally:
         gc.enable()
+
+
+def test_an_update_leaves_nothing_behind_and_shows_the_new_scene():
+    need_device()
+    renderer, still = aus.Renderer(SCENE, "gl"), SCENE.objects[0]
+    display = aus.Display.lenticular(32, 24, 4)
+    counts = []
+    for step in range(4):
+        moved = np.eye(4)
+        moved[0, 3] = 0.3 * step
+        renderer.update(transform=moved)
+        found = renderer.render(display, RIG.with_views(4), method="instanced").pixels
+        fresh = aus.Renderer(replace(still, transform=moved), "gl")
+        expected = fresh.render(display, RIG.with_views(4), method="instanced")
+        assert np.abs(found.astype(int) - expected.pixels).max() <= 1  # another origin of local coordinates
+        del fresh
+        counts.append(live_objects())
+    assert counts[1:] == counts[:1] * 3
 
 
 def test_a_frame_after_the_first_sends_no_scene_data():

@@ -123,6 +123,7 @@ class GlEngine:
 
         A stage that can follow a change of its objects has `follow(objects)`; others are made anew.
         """
+        prepared.kept.forget("vertex array")  # they hold on to the buffers of stages that are replaced
         with self.device as device:
             stages, old = [], iter(prepared.stages)
             for kind, make in STAGES:

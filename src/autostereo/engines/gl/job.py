@@ -33,6 +33,11 @@ class Kept:
             self._made[name] = key, make()
         return self._made[name][1]
 
+    def forget(self, kind: str) -> None:
+        """Let go of what is kept under names (kind, …)."""
+        for name in [name for name in self._made if isinstance(name, tuple) and name[0] == kind]:
+            del self._made[name]
+
 
 @dataclass(frozen=True, eq=False)
 class Job:
