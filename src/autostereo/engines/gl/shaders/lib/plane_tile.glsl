@@ -68,14 +68,12 @@ void put(uint number, uint at, uint bits) {
 
 // The position of the lowest bit, which is taken away.
 int next_bit(inout uvec2 mask) {
-    if (mask.x != 0u) {
-        int bit = findLSB(mask.x);
-        mask.x &= mask.x - 1u;
-        return bit;
-    }
-    int bit = findLSB(mask.y);
-    mask.y &= mask.y - 1u;
-    return bit + 32;
+    bool low = mask.x != 0u;
+    uint word = low ? mask.x : mask.y;
+    int bit = findLSB(word);
+    word &= word - 1u;
+    mask = low ? uvec2(word, mask.y) : uvec2(0u, word);
+    return low ? bit : bit + 32;
 }
 
 #ifdef PANEL
@@ -151,28 +149,23 @@ uvec2 coverage(Triangle t, ivec3 tile) {
 }
 
 void put_tile(Triangle t, ivec3 tile, uvec2 mask) {
-    int first = tile.z * pass_views.z, block = pass_views.x + tile.z;
-    int views = min(pass_views.z, pass_views.w - block * pass_views.z);
-    vec4 offset = imageLoad(blocks, ivec2(0, block));
+    vec4 offset = imageLoad(blocks, ivec2(0, pass_views.x + tile.z));
     vec2 corner = vec2(4 * tile.x, 4 * tile.y + first_row) + sample_at.xw;
-    for (int i = 0; i < views; ++i) {
+    uint start = sample_number(4 * tile.xy, tile.z * pass_views.z, picture.x, planes.y);
 #ifdef STAGGER
-        int k = (i + int(t.info.x)) % views;
-        float v = offset[k];
-#else
-        int k = i;
-        float v = offset.x;
-        offset = offset.yzwx;
+    uint turned = t.info.x & 3u;  // begin with this view: 16 bits each
+    mask = (turned & 2u) != 0u ? mask.yx : mask;
+    mask = (turned & 1u) != 0u ? (mask >> 16) | (mask.yx << 16) : mask;
 #endif
-        uint bits = ((k < 2 ? mask.x : mask.y) >> (16 * (k & 1))) & 0xffffu;
-        Depth d = depth_of(t, v);
-        bits = d.none ? 0u : bits;
-        uint start = sample_number(4 * tile.xy, first + k, picture.x, planes.y);
-        while (bits != 0u) {
-            int bit = findLSB(bits);
-            bits &= bits - 1u;
-            ivec2 at = ivec2(bit & 3, bit >> 2);
-            put(t.info.x, start + uint(bit), depth_bits(d, corner.x + float(at.x), corner.y + float(at.y)));
+    while (mask != uvec2(0u)) {
+        int bit = next_bit(mask);
+#ifdef STAGGER
+        bit = (bit + 16 * int(turned)) & 63;
+#endif
+        vec2 pair = bit < 32 ? offset.xy : offset.zw;
+        Depth d = depth_of(t, (bit & 16) == 0 ? pair.x : pair.y);
+        if (!d.none) {
+            put(t.info.x, start + uint(bit), depth_bits(d, corner.x + float(bit & 3), corner.y + float((bit >> 2) & 3)));
         }
     }
 }
