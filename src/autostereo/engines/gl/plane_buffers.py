@@ -139,8 +139,8 @@ def blocks_of(offsets: NDArray[np.float64], size: int, continuous: bool) -> NDAr
     more = 0.5 if continuous else 0.0
     result = np.zeros((len(first), 8))
     result[:, :4] = offsets[np.minimum(first[:, None] + np.arange(4), views - 1)]
-    result[:, 4] = offset_at(offsets, first - more)
-    result[:, 5] = offset_at(offsets, last + more)
+    result[:, 4] = offset_at(offsets, (first - more).astype(np.float64))
+    result[:, 5] = offset_at(offsets, (last + more).astype(np.float64))
     found = result.astype(np.float32)
     found[:, 4:6] += np.abs(found[:, 4:6]) * np.float32(1e-6 if continuous else 0) * [-1, 1]  # rounding
     return found

@@ -4,9 +4,10 @@ A triangle is set up once for all views and rasterised in the space of column, r
 
     vertices → setup → tiles → fine rasteriser, twice → pixel encoding
 
-`setup` clips, snaps, culls; `tiles` finds the blocks of 4×4 pixels × 4 views that a triangle may touch; the fine rasteriser
+`setup` clips, snaps, culls; `tiles` finds the blocks of 4×4 pixels × 4 views that a triangle may touch; the fine one
 leaves in every voxel the least depth, then the first triangle of that depth; `encode` shades what is seen and writes it
-to tiles of views, or of the channels of a panel (lib/plane_triangle.glsl, lib/plane_tile.glsl, plane_*.comp, plane_encode.frag).
+to tiles of views, or of the channels of a panel (lib/plane_triangle.glsl, lib/plane_tile.glsl, plane_*.comp,
+plane_encode.frag).
 For a panel, depths and winners are kept per sub-pixel: each shows one camera, and no other voxel is looked at.
 
 Nothing is read back in between: dispatches take their size from the counts of the stage before. A tile that finds no
@@ -48,7 +49,7 @@ from .programs import Defines
 
 METHODS = ("plane-rasterizer", "plane-rasterizer-n-pass", "plane-rasterizer-planar", "plane-rasterizer-staggered")
 VERSION = 430  # compute shaders and storage buffers
-BARRIERS = 0x2000 | 0x20 | 0x40 | 0x200  # GL_SHADER_STORAGE_, _SHADER_IMAGE_ACCESS_, COMMAND_, BUFFER_UPDATE_BARRIER_BIT
+BARRIERS = 0x2000 | 0x20 | 0x40 | 0x200  # of GL: SHADER_STORAGE, SHADER_IMAGE_ACCESS, COMMAND, BUFFER_UPDATE
 GROUP = 64  # invocations of a work group
 GROUPS = 65535  # work groups in one direction, as many as every device has
 STAGES = ("clear", "vertices", "setup", "tiles", "depth", "winner", "encode")
@@ -280,7 +281,8 @@ class Drawing:
                 corners.points.bind(6)
                 corners.surfaces.bind(7)
                 _set(program, picture=(part.width, part.rows), first_row=part.first_row, first_view=tiles.start)
-                _set(program, first_tile=tiles.start, first_channel=job.first, plane_count=part.planes, sample_at=self.sample_at)
+                counts = {"first_tile": tiles.start, "first_channel": job.first, "plane_count": part.planes}
+                _set(program, **counts, sample_at=self.sample_at)
                 _set(program, range=(int(self.numbers[number]), mesh.triangles))
                 job.vertex_array(program, []).render(ctx.TRIANGLE_STRIP, vertices=4, instances=len(tiles))
 

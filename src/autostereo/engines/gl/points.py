@@ -57,9 +57,9 @@ class Sheet:
         self.stops = texture(each) if stopped else None
         self.nearest_target = ctx.framebuffer([self.nearest], depth)
         self.sums_target = ctx.framebuffer([self.sums, self.weights] if panel else [self.sums], depth)
-        self.offsets_target = ctx.framebuffer([self.offsets]) if panel else None
-        self.all_target = ctx.framebuffer([self.nearest, self.sums, self.weights]) if panel else None
-        self.stops_target = ctx.framebuffer([self.stops], depth) if stopped else None
+        self.offsets_target: Any = ctx.framebuffer([self.offsets]) if panel else None
+        self.all_target: Any = ctx.framebuffer([self.nearest, self.sums, self.weights]) if panel else None
+        self.stops_target: Any = ctx.framebuffer([self.stops], depth) if stopped else None
 
     def give(self, program: Any) -> None:
         """Bind the textures that a program reads."""

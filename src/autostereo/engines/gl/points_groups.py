@@ -1,4 +1,4 @@
-"""Surfels in K groups: the 1+1 pass of Hübner 2007b, section 3.5.2, as printed but for ε, which is each surfel's radius.
+"""Surfels in K groups: the 1+1 pass of Hübner 2007b, section 3.5.2, as printed but for ε, a surfel's radius.
 
 The geometry is drawn once. Each group has a tile of its own in which a depth buffer keeps its nearest surfel, by one
 depth for the three sub-pixels of a pixel; a last pass blends what the groups have kept. Surfels take turns in groups

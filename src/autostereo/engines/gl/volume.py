@@ -10,7 +10,7 @@ voxels beside it, so a scalar is off by no more than NEAR·|∂s/∂x| (per voxe
 a pixel need one ray a pixel. With `volume="exact"` only equal rays share, and slabs are lit in their middle, not
 by the mean of the light at their ends.
 
-Order of a scene: isosurfaces are opaque and come before points; then volumes that compose, all at once; then those of the
+Order of a scene: isosurfaces are opaque and come before points; then volumes that compose, together; then those of the
 greatest value one by one (engines/reference/picture.py).
 """
 
