@@ -46,6 +46,7 @@ class Beneath:
             if texture is not None:
                 texture.use(unit)
                 program[name] = unit
+        program["first_pixel"] = 0, 0
         target = self._both if textures[1] is not None else self._target
         target.viewport = box
         target.use()
