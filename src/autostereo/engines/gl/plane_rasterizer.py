@@ -206,12 +206,13 @@ class Drawing:
         """Depths and winners of a pass; the queue is filled once if the scene is not cut into pieces."""
         for find_depth in (True, False):
             for chunk in self.chunks:
-                if find_depth or len(self.chunks) > 1:
+                known = not find_depth and len(self.chunks) == 1
+                if not known:
                     self._set_up(part, views, chunk)
                     self._find_tiles(part, views, find_depth)
                 with _stage(self.job, "depth" if find_depth else "winner"):
                     fine = self._program("plane_fine.comp", part, views)
-                    _set(fine, find_depth=find_depth, room=self.queue.room)
+                    _set(fine, find_depth=find_depth, known=known, room=self.queue.room)
                     fine.run_indirect(self.queue.counters, 4 * (8 + 6))
                 if not find_depth:
                     self._find_tiles(part, views, find_depth, repeat=True)

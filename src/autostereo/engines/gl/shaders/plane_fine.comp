@@ -6,7 +6,8 @@
 
 layout(local_size_x = 64) in;
 
-uniform int room;  // of the entries
+uniform int room;    // of the entries
+uniform bool known;  // coverage masks: from the round before
 
 void main() {
     uint k = invocation();
@@ -16,7 +17,7 @@ void main() {
     uvec4 entry = imageLoad(entries, place_of(k));
     ivec3 tile = ivec3(entry.y & 4095u, (entry.y >> 12) & 4095u, entry.y >> 24);
     Triangle t = triangle_at(entry.x);
-    if (find_depth) {
+    if (!known) {
         entry.zw = coverage(t, tile);
         imageStore(entries, place_of(k), entry);
     }
