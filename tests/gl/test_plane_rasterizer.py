@@ -55,8 +55,8 @@ def assert_same(one, other):
 
 
 @pytest.mark.parametrize(("name", "options"), [
-    ("smooth", {}), ("soup", {}), ("floor", {}), ("mirrored", {}), ("soup", {"lighting": "vertex"}), ("floor", {"samples": 4}),
-    ("soup", {"shading": "center"}), ("floor", {"lighting": "vertex"}),
+    ("smooth", {}), ("soup", {}), ("floor", {}), ("mirrored", {}), ("soup", {"lighting": "vertex"}),
+    ("floor", {"samples": 4}), ("soup", {"shading": "center"}), ("floor", {"lighting": "vertex"}),
 ], ids=str)  # fmt: skip
 def test_views_are_those_of_the_reference(name, options):
     scene, by = SCENES[name]
@@ -67,7 +67,7 @@ def test_views_are_those_of_the_reference(name, options):
     levels = 3 if name == "floor" else 1  # textures are filtered with few bits
     assert difference[inside].max() <= levels and (difference[inside] > 1).mean() <= 0.001
     assert (difference > levels).mean() <= 0.005
-    np.testing.assert_allclose(found.depth[inside], expected.depth[inside], rtol=2e-4)
+    np.testing.assert_allclose(found.depth[inside], expected.depth[inside], rtol=3e-4)  # vertices are snapped
     assert_same(found, views(scene, rig, "plane-rasterizer-n-pass", **options))
 
 
@@ -180,7 +180,7 @@ def test_planes_as_printed_miss_the_triangle():
     exact = masks(METHOD)[0]
     np.testing.assert_array_equal(found[0], exact[0])
     print(f"last view: {found[-1].sum()} pixels by planes, {exact[-1].sum()} by ruled surfaces")
-    assert found[-1].sum() < 0.7 * exact[-1].sum()
+    assert (found[-1] != exact[-1]).sum() > 0.3 * exact[-1].sum()
 
 
 def test_planes_are_exact_where_parallax_is_the_same():
@@ -206,7 +206,8 @@ def test_triangles_that_share_edges_leave_no_gap_and_do_not_overlap():
 
 def test_large_triangles_are_those_of_the_rasteriser():
     """Thousands of tiles in each view: other invocations look at them; silhouettes may differ by rounding."""
-    floor = aus.Mesh([[-4, -1, 3], [4, -1, 3], [4, 0.5, -3], [-4, 0.5, -3]], [[0, 1, 2], [0, 2, 3]], colors=np.eye(4)[:, :3])
+    corners = [[-4, -1, 3], [4, -1, 3], [4, 0.5, -3], [-4, 0.5, -3]]
+    floor = aus.Mesh(corners, [[0, 1, 2], [0, 2, 3]], colors=np.eye(4)[:, :3])
     rig = replace(RIG, baseline=1.0).with_views(5)
     found, expected = (views(floor, rig, m, (320, 200)) for m in (METHOD, "single-pass"))
     assert np.isfinite(found.depth).mean() > 0.3
@@ -248,7 +249,8 @@ def test_rounds_cover_the_picture_once():
         parts = list(plane_buffers.rounds(size, planes, blocks))
         assert [part.first_row for part in parts] == list(np.cumsum([0, *(part.rows for part in parts[:-1])]))
         assert sum(part.rows for part in parts) == size[1] and all(part.first_row % 4 == 0 for part in parts)
-        assert all(part.rows <= 4 or part.tiles * max(16 * planes, blocks) <= plane_buffers.MAX_SAMPLES for part in parts)
+        most = plane_buffers.MAX_SAMPLES // max(16 * planes, blocks)
+        assert all(part.rows <= 4 or part.tiles <= most for part in parts)
 
 
 # --- the device, and figures -----------------------------------------------------------------------------

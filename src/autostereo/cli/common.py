@@ -397,5 +397,4 @@ def load_picture(path: Path, alpha: bool = False) -> NDArray[np.uint8]:
     """Read a picture as (H, W, 3) uint8, or with `alpha` (H, W, 3 or 4)."""
     from ..io.image import read_image
 
-    pixels = read_image(path)
-    return pixels if alpha else pixels[..., :3].copy()
+    return read_image(path) if alpha else read_image(path)[..., :3].copy()

@@ -1,7 +1,7 @@
 """How many multiplications the plane rasteriser does, counted while its formulas run (PMR 2020, section 3).
 
-The paper has 38·m·n multiplications for n views of a triangle of m pixels view by view, and 30·m + 8·m·n in one pass. Here
-the formulas of lib/plane_triangle.glsl, lib/plane_tile.glsl and plane_setup.comp run on numbers that count.
+The paper has 38·m·n multiplications for n views of a triangle of m pixels view by view, and 30·m + 8·m·n in one pass.
+Here the formulas of lib/plane_triangle.glsl, lib/plane_tile.glsl and plane_setup.comp run on numbers that count.
 A division counts as a multiplication.
 """
 
