@@ -28,7 +28,7 @@ from gl_device import need_device
 
 W, H = SIZE
 METHOD = "plane-rasterizer"
-RANDOM = settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+RANDOM = settings(deadline=None, max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
 CONTINUOUS = aus.Display.slanted(W, H, 9, lens_pitch=5.7, subpixel_pitch=1, slant_deg=9.5, continuous=True)
 
 
@@ -67,7 +67,7 @@ def test_views_are_those_of_the_reference(name, options):
     levels = 3 if name == "floor" else 1  # textures are filtered with few bits
     assert difference[inside].max() <= levels and (difference[inside] > 1).mean() <= 0.001
     assert (difference > levels).mean() <= 0.005
-    np.testing.assert_allclose(found.depth[inside], expected.depth[inside], rtol=3e-4)  # vertices are snapped
+    np.testing.assert_allclose(found.depth[inside], expected.depth[inside], rtol=2e-4)
     assert_same(found, views(scene, rig, "plane-rasterizer-n-pass", **options))
 
 
@@ -138,33 +138,38 @@ def test_of_equally_near_triangles_the_earlier_is_seen():
 
 # --- closed forms ----------------------------------------------------------------------------------------
 
-FAR = aus.Mesh([[-0.8, -1.2, 0.8], [1.3, -0.2, -1.2], [-0.1, 1.4, -0.4]], [[0, 1, 2]])  # depths 3.2 ... 5.2 from z = 4
+FAR = aus.Mesh([[-0.8, -1.2, -1.2], [1.3, -0.2, 0.8], [-0.1, 1.4, -0.4]], [[0, 1, 2]])  # depths 3.2 ... 5.2 from z = 4
 WIDE = aus.Rig(position=(0, 0, 4), views=96, baseline=4.0, fov_y=36.0)
 
 
 def masks(method, size=(256, 128)):
-    """What of each view the triangle covers; and in NumPy, by the ruled surfaces of DESIGN's erratum 1, or planes."""
+    """What of each view the triangle covers; and in NumPy, by the ruled surfaces of DESIGN's erratum 1, or planes.
+
+    Where float32 cannot tell the sign of E, some 1e-3 pixels, what was found is expected.
+    """
     width, height = size
     found = views(FAR, WIDE, method, size)
     focal = height / 2 / np.tan(np.radians(18))
     d = 4 - FAR.vertices[:, 2]
     x, y = width / 2 + focal * FAR.vertices[:, 0] / d, height / 2 - focal * FAR.vertices[:, 1] / d
-    x, y, p = np.round(x * 4096) / 4096, np.round(y * 4096) / 4096, focal * (1 / 4 - 1 / d)
+    x, y, p = np.round(x * 16384) / 16384, np.round(y * 16384) / 16384, focal * (1 / 4 - 1 / d)
     column, row = np.arange(width) + 0.5, np.arange(height)[:, None] + 0.5
     expected, boxes = [], []
     for v in WIDE.camera_offsets:
         columns = x + v * p  # planes go on beyond the triangle's box, which the tiles cut off coarsely
         box = (column >= columns.min()) & (column <= columns.max()) & (row >= y.min()) & (row <= y.max())
         boxes.append(box)
-        inside = box.copy()
+        inside = np.where(box, np.inf, -np.inf)
         for i, j in ((0, 2), (2, 1), (1, 0)):  # clockwise, rows from the top
             slope = v if method == METHOD else WIDE.camera_offsets[0]
             step = x[j] - x[i] + slope * (p[j] - p[i])
-            inside &= (y[i] - y[j]) * (column - x[i] - v * p[i]) + step * (row - y[i]) > 0
+            inside = np.minimum(inside, (y[i] - y[j]) * (column - x[i] - v * p[i]) + step * (row - y[i]))
         expected.append(inside)
     hit = np.isfinite(found.depth)
     assert method != METHOD or not (hit & ~np.array(boxes)).any()
-    return hit & boxes, np.array(expected)
+    values = np.array(expected)
+    assert (np.abs(values) < 0.1).sum() < 3000
+    return hit & boxes, np.where(np.abs(values) < 0.1, hit, values > 0)
 
 
 def test_side_faces_are_ruled_surfaces():
@@ -180,7 +185,7 @@ def test_planes_as_printed_miss_the_triangle():
     exact = masks(METHOD)[0]
     np.testing.assert_array_equal(found[0], exact[0])
     print(f"last view: {found[-1].sum()} pixels by planes, {exact[-1].sum()} by ruled surfaces")
-    assert (found[-1] != exact[-1]).sum() > 0.3 * exact[-1].sum()
+    assert found[-1].sum() < 0.8 * exact[-1].sum()
 
 
 def test_planes_are_exact_where_parallax_is_the_same():
@@ -249,8 +254,8 @@ def test_rounds_cover_the_picture_once():
         parts = list(plane_buffers.rounds(size, planes, blocks))
         assert [part.first_row for part in parts] == list(np.cumsum([0, *(part.rows for part in parts[:-1])]))
         assert sum(part.rows for part in parts) == size[1] and all(part.first_row % 4 == 0 for part in parts)
-        most = plane_buffers.MAX_SAMPLES // max(16 * planes, blocks)
-        assert all(part.rows <= 4 or part.tiles <= most for part in parts)
+        most = plane_buffers.MAX_SAMPLES
+        assert all(part.rows <= 4 or part.tiles * max(16 * planes, blocks) <= most for part in parts)
 
 
 # --- the device, and figures -----------------------------------------------------------------------------

@@ -14,7 +14,7 @@ uniform bool two_sided;
 uniform vec2 reach;          // least and greatest camera offset of this pass
 uniform int room;            // of the triangles
 
-const float SNAP = 4096.0;        // steps of a pixel; coarser ones are seen in the depths of floors
+const float SNAP = 16384.0;       // steps of a pixel; coarser ones are seen in the depths of floors
 const float FAR_OUT = 1e9;        // pixels that still are whole numbers of 32 bits
 const float LARGE_TILES = 256.0;  // more than these are looked at by many invocations
 
