@@ -31,7 +31,8 @@ Triangle triangle_at(uint slot) {
     return t;
 }
 
-// Window depth in view v: where corner 0 is, what is gained per pixel to the right and down, and least and greatest.
+// Window depth in view v: where the farthest corner is (there digits count most), what is gained per pixel to the right
+// and down, and least and greatest.
 struct Depth {
     vec3 start;
     vec2 gain;
@@ -48,7 +49,9 @@ Depth depth_of(Triangle t, float v) {
     precise float right = (a.z * b.y - b.z * a.y) / area, down = (a.x * b.z - b.x * a.z) / area;
     vec3 z = vec3(t.corner[0].w, t.corner[1].w, t.corner[2].w);
     vec2 range = vec2(min(z.x, min(z.y, z.z)), max(z.x, max(z.y, z.z)));
-    return Depth(vec3(xs.x, t.corner[0].y, z.x), vec2(right, down), range, area == 0.0);
+    vec3 start = z.y > z.x ? vec3(xs.y, t.corner[1].y, z.y) : vec3(xs.x, t.corner[0].y, z.x);
+    start = z.z > start.z ? vec3(xs.z, t.corner[2].y, z.z) : start;
+    return Depth(start, vec2(right, down), range, area == 0.0);
 }
 
 // Its bits at (x, y). Rounding must not lead out of the triangle.
