@@ -13,6 +13,7 @@ from ...scene.scene import Scene
 from ...scene.volume import Volume
 from ..engine import Camera, Draw
 from ..options import Options
+from ..volumes import Slices, half_spaces, make_slices
 from .memory import Memory
 from .mesh import panel_lines
 from .mesh_panel import Panel
@@ -22,14 +23,13 @@ from .scene_arrays import light_array
 from .threads import run_rows
 from .volume_modes import LEVELS
 from .volume_panel import PIXEL_ROWS, draw_panel_rays, draw_panel_rows
-from .volume_plan import SLIDE, can_share, make_slices, share_slices, shared_reach
+from .volume_plan import SLIDE, can_share, share_slices, shared_reach
 from .volume_rays import BLOCK_ROWS, RAYS, ROW
-from .volume_sample import CHUNK, LIST, LIST_ROWS, SLABS, Cut, Planes, Slices
+from .volume_sample import CHUNK, LIST, LIST_ROWS, SLABS, Cut, Planes
 from .volume_setup import (
     BLOCK,
     TABLE,
     Field,
-    half_spaces,
     make_table,
     prepare_field,
     shown_blocks,

@@ -5,29 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
-from ...scene.volume import Volume
 from ..engine import Camera
+from ..volumes import MAX_PLANES, Slices
 from .volume_rays import RAYS
-from .volume_sample import Slices
-from .volume_setup import depth_range
 from .volume_shared import MAX_LENGTH
 
 STEEPEST = 1.0  # greatest offset of a camera over the nearest depth, up to which views may share slabs
 SLIDE = (1.0, 2.0)  # most pixels by which a shared slab's front and back part, in views and, coarser by nature, panels
-MAX_PLANES = 2**20
-
-
-def make_slices(volumes: list[Volume], camera: Camera, step: float) -> Slices | None:
-    """Slices through all volumes (see reference.volume.planes); None when nothing lies behind the near plane."""
-    first, last = depth_range(volumes, camera)
-    if last <= first:
-        return None
-    count = (last - first) / (step * min(float(v.voxel_size.min()) for v in volumes))
-    if count > MAX_PLANES:
-        raise InputError(f"options step: {step:g} voxels make {count:.3g} slabs of the volumes, at most {MAX_PLANES}")
-    slabs = max(1, int(np.ceil(count)))
-    return Slices(first, (last - first) / slabs, slabs)
 
 
 def share_slices(slices: Slices, camera: Camera, offsets: NDArray[np.float64], most: float) -> Slices:

@@ -58,14 +58,6 @@ class Cut(NamedTuple):
     sobel: bool
 
 
-class Slices(NamedTuple):
-    """All slices: depth of the first, distance, number of slabs between them."""
-
-    first: float
-    distance: float
-    slabs: int
-
-
 class Planes(NamedTuple):
     """One thread's memory for the slices at hand.
 

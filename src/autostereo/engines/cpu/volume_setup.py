@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from ...scene.transfer import TransferFunction
 from ...scene.volume import Volume
-from ...transforms import apply
-from ..engine import Camera
+from ..volumes import may_show
 from .jit import inlined, kernel
 from .threads import run_rows
 
@@ -219,45 +218,10 @@ def make_table(transfer: TransferFunction, low: float, high: float, length: floa
 
 def shown_blocks(field: Field, reach: int) -> NDArray[np.uint8]:
     """Blocks (nbz, nby, nbx) within `reach` blocks of which the volume shows anything."""
-    volume, count = field.volume, 4096
-    low, high = volume.value_range
-    ranges = field.blocks.astype(np.float64) * field.value_step + field.first_value
-    if volume.mode == "iso":
-        assert volume.iso is not None
-        shown = (ranges[0] <= volume.iso) & (ranges[1] >= volume.iso)
-    else:
-        values = np.union1d(np.linspace(low, high, count), np.clip(volume.transfer.points[:, 0], low, high))
-        sides = [volume.transfer.limit(values, side)[..., 3] > 0 for side in ("left", "right")]
-        total = np.concatenate([[0], np.cumsum(sides[0] | sides[1])])
-        first = np.maximum(np.searchsorted(values, ranges[0], "right") - 1, 0)
-        last = np.minimum(np.searchsorted(values, ranges[1], "left") + 1, len(values))
-        if volume.mode == "mip":  # what shows nothing but is greater than what does hides it
-            first[...] = 0
-        shown = total[last] > total[first]
+    least, most = field.blocks.astype(np.float64) * field.value_step + field.first_value
+    shown = may_show(field.volume, least, most)
     for axis in range(3):
         padded = np.pad(shown, [(reach, reach) if a == axis else (0, 0) for a in range(3)])
         parts = [np.take(padded, range(k, k + shown.shape[axis]), axis) for k in range(2 * reach + 1)]
         shown = np.logical_or.reduce(parts)
     return np.ascontiguousarray(shown, dtype=np.uint8)
-
-
-# --- space ---------------------------------------------------------------------------------------------------------
-
-
-def half_spaces(volume: Volume) -> NDArray[np.float64]:
-    """Rows h (K, 4) such that h·(i, j, k, 1) ≥ 0 for all of them where something is seen: box, clipping box, plane."""
-    last = np.asarray(volume.shape) - 1.0
-    rows = [np.eye(4)[:3], np.column_stack([-np.eye(3), last])]
-    if volume.clip_box is not None:
-        low, high = volume.clip_box
-        box = np.vstack([np.column_stack([np.eye(3), -low]), np.column_stack([-np.eye(3), high])])
-        rows.append(box[np.isfinite(box).all(axis=1)] @ volume.object_from_index)
-    if volume.clip_plane is not None:
-        rows.append(np.asarray(volume.clip_plane)[None] @ volume.object_from_index)
-    return np.vstack(rows)
-
-
-def depth_range(volumes: list[Volume], camera: Camera) -> tuple[float, float]:
-    """Least and greatest eye depth of the boxes, from the near plane on."""
-    depth = np.concatenate([apply(camera.eye_from_world, v.corners)[:, 2] for v in volumes])
-    return max(float(depth.min()), camera.near), float(depth.max())

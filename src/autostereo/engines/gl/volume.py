@@ -29,6 +29,7 @@ from ...scene.points import Points
 from ...scene.volume import Volume
 from ...viewmap import ViewMap
 from ..reference.shading import lights_in_eye_space
+from ..volumes import Slices, make_slices
 from .beneath import Beneath
 from .context import Device
 from .job import Job, Stage
@@ -36,7 +37,7 @@ from .panel import Panel
 from .programs import Defines
 from .volume_data import TABLE, Look, is_shaded, make_table, place_in, send, table_range
 from .volume_slices import slices_on_panel, slices_on_tiles
-from .volume_space import Slices, most_half_spaces, placing, put, put_units
+from .volume_space import most_half_spaces, placing, put, put_units
 
 TOGETHER = 4  # volumes that compose in one march: each takes three of the 16 texture units that there are at least
 NEAR = 0.25  # voxels that a shared lookup may be beside a ray
@@ -110,7 +111,7 @@ class Rays(Stage):
                 render(job, program, (target, job.device.ctx.NOTHING, False))
 
     def _slices(self, job: Job) -> Slices | None:
-        return Slices.through(self._all, job.draw.camera, job.draw.options.step)
+        return make_slices(self._all, job.draw.camera, job.draw.options.step)
 
     def _program(
         self, job: Job, group: list[Volume], slices: Slices | None, beneath: Beneath | None, half_depth: bool = False

@@ -18,6 +18,7 @@ from ...errors import UnsupportedError
 from ...scene.volume import Volume
 from ..constants import BLOCK_BITS, STEPS
 from ..reference.volume import voxel_gradients
+from ..volumes import may_show
 from .context import Device
 
 WIDE = 2**30  # bytes of a volume, above which texels are of 8 bits
@@ -26,7 +27,6 @@ TABLE = 256  # scalars of the table of pre-integrated slabs
 COLORS = 4096  # of the greatest values
 FAR = 255  # blocks, the farthest that is told
 THICKEST = 1e20  # extinction that the table holds; beyond it nothing changes
-LEVELS_OF_VALUES = 4096  # at which a transfer function is asked whether it shows anything
 
 
 class Voxels:
@@ -143,29 +143,13 @@ def block_ranges(values: NDArray) -> NDArray[np.float32]:
 # --- what a transfer function makes of it ----------------------------------------------------------------------------
 
 
-def shown_blocks(volume: Volume, ranges: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Blocks (nbz, nby, nbx) in which a volume may show something."""
-    low, high = volume.value_range
-    least, most = ranges.astype(np.float64)
-    if volume.mode == "iso":
-        assert volume.iso is not None
-        tolerance = 2 * (high - low) / 65535
-        return np.asarray((least <= volume.iso + tolerance) & (most >= volume.iso - tolerance))
-    values = np.union1d(np.linspace(low, high, LEVELS_OF_VALUES), np.clip(volume.transfer.points[:, 0], low, high))
-    sides = [volume.transfer.limit(values, side)[..., 3] > 0 for side in ("left", "right")]
-    total = np.concatenate([[0], np.cumsum(sides[0] | sides[1])])
-    first = np.maximum(np.searchsorted(values, least, "right") - 1, 0)
-    last = np.minimum(np.searchsorted(values, most, "left") + 1, len(values))
-    if volume.mode == "mip":  # what shows nothing but is greater than what does hides it
-        first[...] = 0
-    return np.asarray(total[last] > total[first])
-
-
 def emptiness(volume: Volume, ranges: NDArray[np.float32]) -> NDArray[np.uint8]:
     """How many blocks away, any way, the nearest is that shows something; 0 for those themselves."""
     from scipy.ndimage import distance_transform_cdt
 
-    shown = shown_blocks(volume, ranges)
+    low, high = volume.value_range
+    least, most = ranges.astype(np.float64)
+    shown = may_show(volume, least, most, 2 * (high - low) / 65535)  # scalars are stored in 16 bits
     if not shown.any():
         return np.full(shown.shape, FAR, np.uint8)
     return np.minimum(distance_transform_cdt(~shown, "chessboard"), FAR).astype(np.uint8)
