@@ -21,6 +21,7 @@ from .volume_cases import (
     H,
     W,
     assert_alike,
+    assert_one_pass_is_many,
     panel,
     random,
     rigs,
@@ -88,15 +89,7 @@ def test_panels_are_those_of_the_reference(engine, scene, rig, name, sampling, c
 def test_one_pass_is_many_bit_for_bit(engine, scene, rig, name, count):
     need(engine)
     display, options = DISPLAYS[name], {"samples": count, **EXACT}
-    rig = rig.with_views(display.views)
-    one = views(scene, rig, engine, depth=True, **options)
-    many = views(scene, rig, engine, method="n-pass", depth=True, **options)
-    np.testing.assert_array_equal(one.color, many.color)
-    np.testing.assert_array_equal(one.depth, many.depth)
-    np.testing.assert_array_equal(views(scene, rig, engine, **options).color, many.color)
-    found = panel(scene, display, rig, engine, **options)
-    np.testing.assert_array_equal(found, aus.interlace(many, display).pixels)
-    np.testing.assert_array_equal(found, panel(scene, display, rig, engine, method="n-pass", **options))
+    assert_one_pass_is_many(scene, display, rig, engine, **options)
 
 
 def test_the_order_of_objects_does_not_matter(engine):

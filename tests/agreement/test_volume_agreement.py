@@ -18,6 +18,7 @@ from .volume_cases import (
     H,
     W,
     assert_alike,
+    assert_one_pass_is_many,
     panel,
     place,
     psnr,
@@ -29,8 +30,7 @@ from .volume_cases import (
     views,
 )
 
-# gl is held to the reference within its own bounds in tests/gl/test_volume.py
-pytestmark = pytest.mark.parametrize("engine", [name for name in engines_for(aus.Volume) if name != "gl"])
+pytestmark = pytest.mark.parametrize("engine", engines_for(aus.Volume))
 STEPS = st.sampled_from([0.5, 1.0, 2.0])
 EXACT = {"volume": "exact"}
 
@@ -90,15 +90,7 @@ def test_lit_isosurfaces(engine, scene, rig, step):
 def test_one_pass_of_exact_rays_is_many_bit_for_bit(engine, scene, rig, name, count, step):
     need(engine)
     display, options = DISPLAYS[name], {"samples": count, "step": step, **EXACT}
-    rig = rig.with_views(display.views)
-    one = views(scene, rig, engine, depth=True, **options)
-    many = views(scene, rig, engine, method="n-pass", depth=True, **options)
-    np.testing.assert_array_equal(one.color, many.color)
-    np.testing.assert_array_equal(one.depth, many.depth)
-    np.testing.assert_array_equal(views(scene, rig, engine, **options).color, many.color)
-    found = panel(scene, display, rig, engine, **options)
-    np.testing.assert_array_equal(found, aus.interlace(many, display).pixels)
-    np.testing.assert_array_equal(found, panel(scene, display, rig, engine, method="n-pass", **options))
+    assert_one_pass_is_many(scene, display, rig, engine, **options)
 
 
 @given(scenes(modes=("composite",), steep=False), rigs(inside=False))
@@ -271,9 +263,11 @@ def test_the_greatest_value_of_a_ramp_is_at_an_end(engine):
     np.testing.assert_allclose(seen.depth[:, 8:22, 10:30], 4.0, rtol=1e-5)
 
 
-def test_shared_slabs_of_the_benchmark_are_45_decibels_from_exact_rays(engine):
+def test_shared_slabs_of_the_benchmark_are_45_decibels_from_exact_rays(engine, request):
     """At the outermost of 48 views 420×560, on a step; coarse volumes too, against exact rays of thin slabs."""
     need(engine)
+    if engine == "gl":
+        request.applymarker(pytest.mark.xfail(reason="gl does not divide the slabs of coarse volumes: 41 dB"))
     from autostereo.cli.benchmarks.workloads import rig_for, step_transfer
 
     for count, step in ((16, 0.25), (32, 0.25), (128, 1.0)):

@@ -196,3 +196,16 @@ def smooth(stack: NDArray[np.uint8]) -> NDArray[np.bool_]:
     size = (1, 3, 3, 1)
     spread = ndimage.maximum_filter(stack, size).astype(int) - ndimage.minimum_filter(stack, size)
     return np.asarray(spread.max(axis=-1) <= 24)
+
+
+def assert_one_pass_is_many(scene, display, rig, engine, **options):
+    """One pass and n passes are equal bit for bit, with and without depths, as views and on a panel."""
+    rig = rig.with_views(display.views)
+    one = views(scene, rig, engine, depth=True, **options)
+    many = views(scene, rig, engine, method="n-pass", depth=True, **options)
+    np.testing.assert_array_equal(one.color, many.color)
+    np.testing.assert_array_equal(one.depth, many.depth)
+    np.testing.assert_array_equal(views(scene, rig, engine, **options).color, many.color)
+    found = panel(scene, display, rig, engine, **options)
+    np.testing.assert_array_equal(found, aus.interlace(many, display).pixels)
+    np.testing.assert_array_equal(found, panel(scene, display, rig, engine, method="n-pass", **options))

@@ -183,7 +183,7 @@ class Rays(Stage):
         else:
             (low, high), iso = volume.value_range, volume.iso
             assert iso is not None
-            level = (iso - low) / max(high - low, 1e-300)
+            level = np.clip((iso - low) / max(high - low, 1e-300), -1.0, 2.0)  # beyond 0 … 1 nothing is hit
             put(program, level=level, own_color=volume.transfer.evaluate(iso)[:3])
 
     def _tell_tables(self, program: Any, job: Job, group: list[Volume], slices: Slices) -> None:
