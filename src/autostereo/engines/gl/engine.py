@@ -107,31 +107,13 @@ class GlEngine:
                 raise UnsupportedError(f"engine gl draws {names}, the scene holds a {type(item).__name__}")
         middle = scene.bounds.mean(axis=0)
         with self.device as device:
-            stages = []
-            for kind, stage in STAGES:
-                objects = [item for item in scene.objects if type(item) is kind]
-                if objects:
-                    stages.append(stage(device, objects, middle))
-            return Prepared(scene, middle, stages, Blocks(device))
+            return Prepared(scene, middle, make_stages(device, scene, middle), Blocks(device))
 
     def update(self, prepared: Prepared, scene: Scene) -> Prepared:
-        """The same objects under other transforms and transfer functions: what has not changed is not sent again.
-
-        A stage that can follow a change of its objects has `follow(objects)`; others are made anew.
-        """
+        """The same objects under other transforms and transfer functions: stages of what has not changed stay."""
         prepared.kept.forget("vertex array")  # they hold on to the buffers of stages that are replaced
         with self.device as device:
-            stages, old = [], iter(prepared.stages)
-            for kind, make in STAGES:
-                objects = [item for item in scene.objects if type(item) is kind]
-                if not objects:
-                    continue
-                stage, before = next(old), [item for item in prepared.scene.objects if type(item) is kind]
-                if any(a is not b for a, b in zip(objects, before, strict=True)):
-                    follow = getattr(stage, "follow", None)
-                    stage = follow(objects) if follow else make(device, objects, prepared.middle)
-                stages.append(stage)
-            return replace(prepared, scene=scene, stages=stages)
+            return replace(prepared, scene=scene, stages=make_stages(device, scene, prepared.middle, prepared))
 
     def draw(self, prepared: Prepared, draw: Draw, target: Target) -> None:
         """Draw a stack of views, or a panel, by `draw.method`."""
@@ -178,6 +160,23 @@ class GlEngine:
         """A job without a scene, to gather pictures by the mask."""
         nothing: Any = None
         return with_mask(Job(device, nothing, np.zeros(3), draw, nothing, Blocks(device), Kept()))
+
+
+def make_stages(
+    device: Device, scene: Scene, middle: NDArray[np.float64], before: Prepared | None = None
+) -> list[Any]:
+    """The stages of a scene, in drawing order; those `before` whose objects are the same are used again."""
+    stages: list[Any] = []
+    for kind, make in STAGES:
+        objects = [item for item in scene.objects if type(item) is kind]
+        if not objects:
+            continue
+        old = [] if before is None else [item for item in before.scene.objects if type(item) is kind]
+        if before is not None and all(a is b for a, b in zip(objects, old, strict=True)):
+            stages.append(before.stages[len(stages)])
+        else:
+            stages.append(make(device, objects, middle))
+    return stages
 
 
 def with_mask(job: Job) -> Job:
