@@ -30,7 +30,7 @@ from .mesh_setup import (
 )
 from .mesh_views import draw_views
 from .panel_lines import BUCKET, LinePlan, line_capacity, plan_lines
-from .panel_list import FLOAT_ROWS, INT_ROWS, STRIDE, Block
+from .panel_list import STRIDE, Block
 from .scene_arrays import SceneArrays, background_word, light_array, scene_arrays
 from .simd import LANES
 from .threads import run_rows
@@ -124,8 +124,7 @@ def new_scratch(samples: int, sums: int, exact: tuple[int, int]) -> Scratch:
         band,
         band.view(np.int32),
         np.zeros(2 * LANES, np.float32),
-        np.zeros(FLOAT_ROWS * STRIDE, np.float32),
-        np.zeros(INT_ROWS * STRIDE, np.int32),
+        np.zeros(STRIDE, np.int32),
         words,
         words.view(np.int32),
         np.zeros(3 * LANES, np.float32),

@@ -16,10 +16,10 @@ from .mesh_block import draw_row
 from .mesh_reuse import shade_exact, shade_or_reuse
 from .mesh_shade import PLAIN, to_levels
 from .panel_lines import LinePlan, make_lines, row_offsets
-from .panel_list import ADDRESS, Block, draw_stretch
+from .panel_list import ADDRESS, Block, draw_stretch, samples_at
 from .samples import clear_samples, depth_bits, hit, keep_nearer, store_words
 from .scalars import BYTE, ZERO
-from .simd import LANES, gather, greater, lesser, load, mask_word, select, splat, to_float, to_int
+from .simd import LANES, gather, greater, lesser, load, mask_word, select, splat, to_int
 
 
 class Panel(NamedTuple):
@@ -60,19 +60,11 @@ def draw_listed(n, place, row, ends, what, scratch):
     """Draw the listed samples of a segment; what = (depths, kind, shader, shading)."""
     depths, kind, shader, shading = what
     ints, segment, band, halves = scratch.ints, scratch.segment, scratch.band, scratch.halves
-    words, word_halves, offsets = scratch.words, scratch.word_halves, place.block.offsets
+    words, word_halves = scratch.words, scratch.word_halves
     reuse = shader.exact.shape[0] > 0 and kind != PLAIN
-    columns, first = np.int32(place.columns), np.float32(place.first)
-    begin = np.int32(row * 3 * place.columns)
-    two = np.int32(2 * place.columns)
-    red, middle, last, at = place.at[0], place.at[1], place.at[2], place.at[3]
     for i in range(0, n, LANES):
         address = load(ints, ADDRESS + np.uint64(i))
-        k = address - begin
-        green, blue = k >= columns, k >= two
-        k = k - select(blue, two, select(green, splat(columns), np.int32(0)))
-        x = (to_float(k) + first) + select(blue, last, select(green, middle, splat(red)))
-        offset = gather(offsets, address)
+        x, offset, green, blue = samples_at(address, row, place)
         covered, z, u = hit(x, offset, ends, depths)
         depth = depth_bits(covered, z)
         if kind == PLAIN:
@@ -81,7 +73,7 @@ def draw_listed(n, place, row, ends, what, scratch):
             seen = mask_word(depth > gather(halves, address * np.int32(2) + np.int32(1)))
             if seen == 0:
                 continue
-            color = shade_or_reuse(kind, reuse, seen, (x, z, offset), u, at, shader, shading, scratch)
+            color = shade_or_reuse(kind, reuse, seen, (x, z, offset), u, place.at[3], shader, shading, scratch)
         store_words(depth, color, word_halves)
         for j in range(LANES):
             keep_nearer(np.uint64(ints[ADDRESS + np.uint64(i + j)]), words[j], band)

@@ -47,7 +47,7 @@ class Scratch(NamedTuple):
     """One thread's own memory.
 
     band: samples, and the same as 32-bit halves; segment (16,) float32: attributes at the left end, then differences;
-    lists, ints: of a panel (panel_list); words (16,), and as halves: samples at hand; lanes (24,) float32 and chosen
+    ints: addresses of samples at hand; words (16,), and as halves: samples at hand; lanes (24,) float32 and chosen
     (8,) int32: of eight samples; detail (17,) float32: row_geometry, then uv_gradient; setup, ends: see cut_triangles;
     sums of sub-samples; colours and spans of exact views, numbers of listed and reused samples (mesh_reuse).
     """
@@ -55,7 +55,6 @@ class Scratch(NamedTuple):
     band: np.ndarray
     halves: np.ndarray
     segment: np.ndarray
-    lists: np.ndarray
     ints: np.ndarray
     words: np.ndarray
     word_halves: np.ndarray

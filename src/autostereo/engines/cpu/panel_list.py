@@ -13,19 +13,32 @@ import numpy as np
 from .jit import inlined
 from .panel_lines import BUCKET
 from .scalars import ONE, ZERO
-from .simd import LANES, append, ceil, floor, greater, iota, lesser, load, mask_word, select, splat, store, to_int
+from .simd import (
+    LANES,
+    append,
+    ceil,
+    floor,
+    gather,
+    greater,
+    iota,
+    lesser,
+    load,
+    mask_word,
+    select,
+    splat,
+    store,
+    to_float,
+    to_int,
+)
 
 STRIDE = 1040  # room of a list: CAPACITY, what a step more adds, and what fills it up; no multiple of a page
 CAPACITY = 1000
 SLACK = np.float32(4e-3)  # rounding moves the end of a segment by less
 FAR = np.float32(1e9)
 
-# rows of the float32 lists …
+# rows of the float32 lists of points, and the place of the int32 list of all
 LANE_U, LANE_Z, LANE_X, LANE_OFFSET, COLOR = (np.uint64(k * STRIDE) for k in range(5))
-FLOAT_ROWS = 5
-# … and of the int32 lists
 ADDRESS = np.uint64(0)
-INT_ROWS = 1
 
 
 class Block(NamedTuple):
@@ -149,16 +162,20 @@ def draw_stretch(draw_listed, place, row, ends, what, scratch):
 
 
 @inlined
+def samples_at(address, row, place):
+    """Pixel position and camera offset of eight samples, and which of them are green or blue, and blue."""
+    columns, two = np.int32(place.columns), np.int32(2 * place.columns)
+    k = address - np.int32(row * 3 * place.columns)
+    green, blue = k >= columns, k >= two
+    k = k - select(blue, two, select(green, splat(columns), np.int32(0)))
+    at = select(blue, place.at[2], select(green, place.at[1], splat(place.at[0])))
+    return (to_float(k) + np.float32(place.first)) + at, gather(place.block.offsets, address), green, blue
+
+
+@inlined
 def place_samples(n, row, place, lists, ints):
-    """Pixel position and exact camera offset of the listed samples."""
-    offsets, red, green, blue = place.block.offsets, place.at[0], place.at[1], place.at[2]
-    begin, first, columns = np.int32(row * 3 * place.columns), np.float32(place.first), np.float32(place.columns)
-    for i in range(n):
-        lists[LANE_OFFSET + i] = offsets[np.uint64(ints[ADDRESS + i])]
-    for i in range(n):
-        k = np.float32(np.int32(ints[ADDRESS + i] - begin))
-        at = red if k < columns else (green if k < columns + columns else blue)
-        k = k if k < columns else (k - columns if k < columns + columns else k - columns - columns)
-        lists[LANE_X + i] = (k + first) + at
-
-
+    """Pixel position and exact camera offset of the listed samples, whole SIMD steps of them."""
+    for i in range(np.uint64(0), n, np.uint64(LANES)):
+        x, offset, _, _ = samples_at(load(ints, ADDRESS + i), row, place)
+        store(lists, LANE_X + i, x)
+        store(lists, LANE_OFFSET + i, offset)
