@@ -200,6 +200,7 @@ def test_the_first_run_of_every_primitive_says_that_it_compiles(
 
 def test_names_of_kernels_are_those_of_the_engine() -> None:
     from autostereo.engines.cpu import mesh_panel, mesh_views, points_panel, points_views, volume_panel, volume_views
+    from autostereo.engines.cpu.kernels import kernels_for
     from autostereo.engines.options import Options
     from autostereo.scene import samples
 
@@ -207,7 +208,7 @@ def test_names_of_kernels_are_those_of_the_engine() -> None:
     every = [samples.shells(16), samples.surfel_cloud(100), aus.Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [[0, 1, 2]])]
     for scene in (aus.Scene(every), aus.Scene(every[:1])):
         for panel in (False, True):
-            for name in common.kernels_for(scene, panel, Options()):
+            for name in kernels_for(scene, panel, Options()):
                 assert any(hasattr(module, name.removesuffix("-")) for module in modules)
 
 

@@ -121,39 +121,34 @@ def same(a: np.ndarray, b: np.ndarray) -> None:
     np.testing.assert_array_equal(a.view(np.uint8), b.view(np.uint8))
 
 
+def assert_compiled_as_defined(function, a: np.ndarray, *outputs: np.ndarray) -> None:
+    """What `function` returns and writes into outputs is the same compiled and not; NaN where NaN is."""
+    wanted = [np.zeros_like(out) for out in outputs]
+    got = COMPILED[function.__name__](a, *outputs)
+    with np.errstate(all="ignore"):
+        assert got == function(a, *wanted)
+    for out, right in zip(outputs, wanted, strict=True):
+        nan = np.isnan(right)
+        np.testing.assert_array_equal(np.isnan(out), nan)
+        same(out[~nan], right[~nan])
+
+
 @given(floats)
 @settings(deadline=None, max_examples=60)
 def test_floats(a: np.ndarray) -> None:
-    out, wanted = np.zeros(25 * LANES, np.float32), np.zeros(25 * LANES, np.float32)
-    got = COMPILED["arithmetic"](a, out)
-    with np.errstate(all="ignore"):
-        assert got == arithmetic(a, wanted)
-    nan = np.isnan(wanted)
-    np.testing.assert_array_equal(np.isnan(out), nan)
-    same(out[~nan], wanted[~nan])
+    assert_compiled_as_defined(arithmetic, a, np.zeros(25 * LANES, np.float32))
 
 
 @given(doubles)
 @settings(deadline=None, max_examples=60)
 def test_doubles(a: np.ndarray) -> None:
-    out, wanted = np.zeros(8 * LANES), np.zeros(8 * LANES)
-    narrow, wanted_narrow = np.zeros(LANES, np.float32), np.zeros(LANES, np.float32)
-    got = COMPILED["doubles_of"](a, out, narrow)
-    with np.errstate(all="ignore"):
-        assert got == doubles_of(a, wanted, wanted_narrow)
-    nan = np.isnan(wanted)
-    same(out[~nan], wanted[~nan])
-    same(narrow, wanted_narrow)
+    assert_compiled_as_defined(doubles_of, a, np.zeros(8 * LANES), np.zeros(LANES, np.float32))
 
 
 @given(ints)
 @settings(deadline=None, max_examples=60)
 def test_whole_numbers(a: np.ndarray) -> None:
-    out, wanted = np.zeros(12 * LANES, np.int32), np.zeros(12 * LANES, np.int32)
-    got = COMPILED["whole_numbers"](a, out)
-    with np.errstate(all="ignore"):
-        assert got == whole_numbers(a, wanted)
-    same(out, wanted)
+    assert_compiled_as_defined(whole_numbers, a, np.zeros(12 * LANES, np.int32))
 
 
 @given(words, words, st.sampled_from([0, 0xFFFFFFFF]))

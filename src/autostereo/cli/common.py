@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
     from ..display.display import Display
     from ..display.rig import Rig
-    from ..engines.options import Options
     from ..scene.scene import Scene
     from ..scene.volume import Volume
 
@@ -240,18 +239,6 @@ def working(text: str, total: int | None = None) -> Iterator[Callable[[], None]]
         yield lambda: progress.advance(task)
 
 
-def kernels_for(scene: Scene, panel: bool, options: Options) -> tuple[str, ...]:
-    """Names of the kernels that draw a scene, to panels or to views."""
-    kinds = {type(item).__name__ for item in scene.objects}
-    shared = kinds == {"Volume"} and len(scene.objects) == 1 and options.volume == "shared"
-    names = {
-        "Mesh": ("draw_views", "draw_panel"),
-        "Points": ("splat_views", "splat_panel"),
-        "Volume": ("draw_shared_rows", "draw_panel_rows") if shared else ("draw_rows", "draw_panel_rays"),
-    }
-    return tuple(f"{names[kind][panel]}-" for kind in sorted(kinds))  # "-": the whole name
-
-
 def announce_compilation(engine: str, *kernels: str) -> None:
     """Say so when this is the run that compiles these kernels."""
     from ..engines.engine import gpu_answers
@@ -397,4 +384,5 @@ def load_picture(path: Path, alpha: bool = False) -> NDArray[np.uint8]:
     """Read a picture as (H, W, 3) uint8, or with `alpha` (H, W, 3 or 4)."""
     from ..io.image import read_image
 
-    return read_image(path) if alpha else read_image(path)[..., :3].copy()
+    pixels = read_image(path)
+    return pixels if alpha else pixels[..., :3].copy()

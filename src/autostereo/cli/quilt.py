@@ -75,9 +75,10 @@ def quilt(
     if rig.aspect is None:
         rig = replace(rig, aspect=layout.aspect)
     from ..encoders.quilt import save_quilt
+    from ..engines.cpu.kernels import kernels_for
     from ..render import render_views
 
-    common.announce_compilation(engine, *common.kernels_for(scene, False, options))
+    common.announce_compilation(engine, *kernels_for(scene, False, options))
     with common.working(f"rendering {rig.views} views"):
         stack = render_views(scene, rig, layout.tile, method=method, engine=engine, options=options)
     with common.working("writing"):

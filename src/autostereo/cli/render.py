@@ -54,8 +54,9 @@ def render(
     from ..engines.options import Options
 
     where = common.load_display(display, size, swap, views, continuous)
-    look = {"shading": shading, "lighting": lighting, "sampling": sampling, "samples": samples}
-    options = Options(**look, step=step, volume=volume, alpha=alpha)  # type: ignore[arg-type]
+    options = Options(
+        shading=shading, lighting=lighting, sampling=sampling, samples=samples, step=step, volume=volume, alpha=alpha
+    )
     volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
     common.check_side(side, camera)
     rig = common.load_camera(camera)
@@ -63,11 +64,12 @@ def render(
     scene = common.load_scene(inputs, background, volumes)
 
     from ..display.rig import Rig
+    from ..engines.cpu.kernels import kernels_for
     from ..render import render as draw
 
     rig = rig or Rig.frame(scene, where, side)
     one_pass = where.viewmap is not None and method == "single-pass"
-    common.announce_compilation(engine, *common.kernels_for(scene, one_pass, options))
+    common.announce_compilation(engine, *kernels_for(scene, one_pass, options))
     start = perf_counter()
     with common.working("rendering"):
         panel = draw(scene, where, rig, method=method, engine=engine, options=options)

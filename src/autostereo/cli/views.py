@@ -64,8 +64,9 @@ def views(
     common.check_views(views)
     if suffix in ANIMATIONS:
         check_animation(output, pixels)
-    look = {"shading": shading, "lighting": lighting, "samples": samples, "depth": depth}
-    options = Options(**look, step=step, volume=volume)  # type: ignore[arg-type]
+    options = Options(
+        shading=shading, lighting=lighting, samples=samples, depth=depth, step=step, volume=volume
+    )
     volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
     common.check_side(side, camera)
     rig = common.load_camera(camera)
@@ -73,9 +74,10 @@ def views(
     scene = common.load_scene(inputs, background, volumes)
     rig = common.frame_views(scene, rig, views, pixels, display, side)
 
+    from ..engines.cpu.kernels import kernels_for
     from ..render import render_views
 
-    common.announce_compilation(engine, *common.kernels_for(scene, False, options))
+    common.announce_compilation(engine, *kernels_for(scene, False, options))
     with common.working(f"rendering {rig.views} views"):
         stack = render_views(scene, rig, pixels, method=method, engine=engine, options=options)
     with common.working("writing", None):

@@ -44,7 +44,9 @@ class Options:
     views_per_pass : int, optional
         Method geometry-shader: views that one pass draws; None: as many as the device can.
     groups : int
-        For splats on the OpenGL engine.
+        For splats on an OpenGL engine that draws them in groups, as Hübner 2007b does; none does yet.
+    proxy : {"march", "slices"}
+        Volumes on the OpenGL engine: a ray march, or view-aligned slices blended back to front (Hübner 2007a).
     """
 
     shading: str = "exact"
