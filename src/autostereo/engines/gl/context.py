@@ -21,6 +21,7 @@ from ...errors import AutostereoError, DependencyError, UnsupportedError
 if TYPE_CHECKING:
     from .programs import Programs
 
+VERSIONS = (460, 450, 440, 430, 420, 410, 400, 330)  # asked for in turn; 330 so that a refusal can name what is there
 GL_VERSION = 400  # double precision in shaders, which view maps need (lib/viewmap.glsl)
 DEBIAN_PACKAGES = "libegl1 libgl1-mesa-dri libgl1"
 SOFTWARE = ("llvmpipe", "softpipe", "swiftshader", "software rasterizer")
@@ -178,14 +179,7 @@ def _make() -> Device:
         import moderngl
     except ImportError:
         raise DependencyError("engine gl needs moderngl: pip install autostereo[gl]") from None
-    linux = sys.platform.startswith("linux")
-    settings: dict[str, Any] = {"backend": "egl"} if linux else {}
-    try:
-        ctx = moderngl.create_context(standalone=True, require=330, **settings)
-    except Exception as error:  # moderngl and its backends raise plain exceptions
-        remedy = f"install a graphics driver, or Mesa's (Debian, Ubuntu: apt-get install {DEBIAN_PACKAGES})"
-        advice = remedy if linux else "install a graphics driver"
-        raise DependencyError(f"engine gl gets no OpenGL context ({_first_line(error)}): {advice}") from error
+    ctx = _newest_context(moderngl)
     ctx.gc_mode = "context_gc"
     info = ctx.info
     limits = Limits(
@@ -200,6 +194,20 @@ def _make() -> Device:
     _release_current()
     device.require(GL_VERSION, "engine gl")
     return device
+
+
+def _newest_context(moderngl: Any) -> Any:
+    """A context of the newest version to be had: some drivers (NVIDIA's) give the version asked for and no more."""
+    linux = sys.platform.startswith("linux")
+    settings: dict[str, Any] = {"backend": "egl"} if linux else {}
+    for version in VERSIONS:
+        try:
+            return moderngl.create_context(standalone=True, require=version, **settings)
+        except Exception as error:  # moderngl and its backends raise plain exceptions
+            refusal = error
+    remedy = f"install a graphics driver, or Mesa's (Debian, Ubuntu: apt-get install {DEBIAN_PACKAGES})"
+    advice = remedy if linux else "install a graphics driver"
+    raise DependencyError(f"engine gl gets no OpenGL context ({_first_line(refusal)}): {advice}") from refusal
 
 
 def _first_line(error: Exception) -> str:
