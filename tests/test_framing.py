@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -179,7 +180,7 @@ def test_equal_angles_count_their_widest_step() -> None:
     rig = Rig(position=(0, 0, 10), fov_y=14, baseline=20 * math.tan(math.radians(20)), views=48, aspect=0.75)
     even, outer = (
         depth_budget(box((0, 0, 0), (1, 1, 3)), display, r).disparity_far
-        for r in (rig, Rig(**{**vars(rig), "spacing": "equal-angle"}))
+        for r in (rig, replace(rig, spacing="equal-angle"))
     )
     assert outer / even == pytest.approx(1.08, abs=0.01)  # displays.md 3.4: outer pairs exceed the mean by 8 %
 

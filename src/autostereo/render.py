@@ -26,6 +26,7 @@ from .scene.volume import Volume
 
 MAX_SIDE = 65536
 MAX_VIEWS = 4096
+CACHE_LINE = 64  # bytes
 
 
 def render(
@@ -188,7 +189,7 @@ class Renderer:
         if held is None or held.shape != shape:
             check_memory(int(np.prod([int(n) for n in shape])) * np.dtype(dtype).itemsize, describe(shape))
             self._held.pop(name, None)
-            held = self._held[name] = np.empty(shape, dtype)
+            held = self._held[name] = aligned_empty(shape, dtype)
         return held
 
     def _render_packed(
@@ -278,6 +279,14 @@ def check_arguments(rig: Any, options: Any) -> None:
         raise InputError(f"rig views: expected at most {MAX_VIEWS}, got {rig.views}")
     if options is not None and not isinstance(options, Options):
         raise InputError(f"options: expected Options(…), got {type(options).__name__}")
+
+
+def aligned_empty(shape: tuple[int, ...], dtype: type) -> NDArray[Any]:
+    """An array that begins with a cache line, so that engines can write whole lines of it."""
+    size = int(np.prod([int(n) for n in shape])) * np.dtype(dtype).itemsize
+    room = np.empty(size + CACHE_LINE, np.uint8)
+    first = -room.ctypes.data % CACHE_LINE
+    return room[first : first + size].view(dtype).reshape(shape)
 
 
 def make_camera(rig: Rig, size: tuple[int, int]) -> Camera:

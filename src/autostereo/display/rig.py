@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -89,7 +90,7 @@ class Rig:
         put = object.__setattr__
         for name in ("position", "target", "up"):
             put(self, name, _vector(name, getattr(self, name)))
-        eye_from_world(self.position, self.target, self.up)  # raises if degenerate
+        _ = self.eye_from_world  # raises if degenerate
         put(self, "fov_y", _number("fov_y", self.fov_y, 0.0, 179.0, open_low=True))
         put(self, "baseline", _number("baseline", self.baseline, 0.0, 1e30))
         put(self, "offset_y", _number("offset_y", self.offset_y, -1e30, 1e30))
@@ -147,10 +148,12 @@ class Rig:
         """Camera offset at camera coordinates u: piecewise linear through the cameras, continued beyond the ends."""
         return offset_at(self.camera_offsets, u)
 
-    @property
+    @cached_property
     def eye_from_world(self) -> NDArray[np.float64]:
         """Centre camera's transform, (4, 4): x right, y up, z = depth."""
-        return eye_from_world(self.position, self.target, self.up)
+        transform = eye_from_world(self.position, self.target, self.up)
+        transform.flags.writeable = False
+        return transform
 
     def with_views(self, views: int) -> Rig:
         """The same rig with `views` cameras over its baseline; explicit offsets must already be that many."""

@@ -16,17 +16,18 @@ from .mesh_block import draw_row
 from .mesh_reuse import shade_exact, shade_or_reuse
 from .mesh_shade import PLAIN, plain_color, to_levels
 from .samples import (
-    COLOR_MASK,
     DEPTH_SHIFT,
     EMPTY,
     clear_samples,
-    colors_of,
     depth_bits,
+    empty_samples,
     hit,
     keep_nearer_pairs,
     store_pairs,
 )
-from .simd import LANES, ceil, gather, greater, lesser, load, mask_word, splat, store, stream, to_int
+from .simd import LANES, ceil, even_lanes, gather, greater, lane, lesser, load, mask_word, splat, store, stream, to_int
+
+PAST_CACHES = 1 << 24  # pixels, 64 MB
 
 
 class Place(NamedTuple):
@@ -98,23 +99,37 @@ def draw_segment(place, ends, depths, kind, shader, shading, scratch):
 
 
 @inlined
-def store_views(row, columns, height, width, views, scratch, line):
-    """Copy the band's colours to the pictures, which are `line`, (V·H·W,) int32."""
-    band, halves = scratch.band, scratch.halves
-    k = np.uint64(0)
+def take_colors(first, empty, halves):
+    """Colours of eight samples from `first` on, which are emptied while they are at hand."""
+    k = np.uint64(2) * first
+    low, high = load(halves, k), load(halves, k + np.uint64(LANES))
+    store(halves, k, empty)
+    store(halves, k + np.uint64(LANES), empty)
+    return even_lanes(low, high)
+
+
+@inlined
+def store_views(row, columns, height, width, views, background, halves, line):
+    """Move the band's colours to the pictures, which are `line`, (V·H·W,) int32.
+
+    Past the caches where they could not hold the pictures; where they can, storing past them is the slower way.
+    """
+    empty = empty_samples(background)
+    k, start = np.uint64(0), np.uint64(line.ctypes.data)
     count = np.uint64(columns[1] - columns[0])
     whole = count & ~np.uint64(LANES - 1)
-    start = line.ctypes.data
     for view in range(views):
-        first = np.uint64((view * height + row) * width + columns[0])
-        if (start + np.uint64(4) * first) % np.uint64(16) == 0:
+        target = np.uint64((view * height + row) * width + columns[0])
+        if line.size > PAST_CACHES and (start + np.uint64(4) * target) % np.uint64(16) == 0:
             for x in range(np.uint64(0), whole, np.uint64(LANES)):
-                stream(line, first + x, colors_of(halves, k + x))
+                stream(line, target + x, take_colors(k + x, empty, halves))
         else:
             for x in range(np.uint64(0), whole, np.uint64(LANES)):
-                store(line, first + x, colors_of(halves, k + x))
+                store(line, target + x, take_colors(k + x, empty, halves))
         for x in range(whole, count):
-            line[first + x] = np.int32(band[k + x] & COLOR_MASK)
+            line[target + x] = halves[np.uint64(2) * (k + x)]
+            halves[np.uint64(2) * (k + x)] = lane(empty, 0)
+            halves[np.uint64(2) * (k + x) + np.uint64(1)] = EMPTY
         k += count
 
 
@@ -172,6 +187,7 @@ def draw_views(bins, surface, camera, shader, offsets, background, side, scratch
     line = out.reshape(-1)
     span = (offsets[0], offsets[views - 1])
     places = np.empty(offsets.shape[0], np.int32)
+    clear_samples(0, views * min(bins[3], width), background, scratch.halves)
     for k in range(bins[0], bins[1]):
         row, first = k // bins[2], k % bins[2] * bins[3]
         columns = (first, min(first + bins[3], width))
@@ -182,7 +198,8 @@ def draw_views(bins, surface, camera, shader, offsets, background, side, scratch
         for v in range(places.shape[0]):
             places[v] = min(v, views - 1) * count
         for s in range(side * side):
-            clear_samples(0, views * count, background, scratch.halves)
+            if s > 0:
+                clear_samples(0, views * count, background, scratch.halves)
             sample = ((s % side + 0.5) / side, (s // side + 0.5) / side)
             at, wide = np.float32(sample[0]), np.float32(width)
             place = Place(offsets, places, views, columns[0], columns[1], at, wide)
@@ -193,5 +210,6 @@ def draw_views(bins, surface, camera, shader, offsets, background, side, scratch
                 store_depth(row, columns, np.float32(camera.focal), scratch.band, s > 0, depth)
         if side > 1:
             store_means(row, columns, side * side, scratch.sums, out)
+            clear_samples(0, views * count, background, scratch.halves)
         else:
-            store_views(row, columns, height, width, views, scratch, line)
+            store_views(row, columns, height, width, views, background, scratch.halves, line)

@@ -13,14 +13,12 @@ from .scalars import ONE
 from .simd import (
     LANES,
     bits,
-    even_lanes,
     first_fours,
     high_halves,
     high_pairs,
     iota,
     keep_greater,
     last_fours,
-    load,
     low_halves,
     low_pairs,
     select,
@@ -102,15 +100,14 @@ def keep_nearer_pairs(k, lanes, addresses, words, band):
 
 
 @inlined
-def clear_samples(first, count, background, halves):
-    """Empty samples from `first` on: infinitely far, the background's colour; up to seven more are cleared, too."""
-    empty = select((iota() & np.int32(1)) == np.int32(0), splat(background), EMPTY)
-    for k in range(2 * np.uint64(first), 2 * np.uint64(first + count), LANES):
-        store(halves, k, empty)
+def empty_samples(background):
+    """Four empty samples, infinitely far and of the background's colour, as halves."""
+    return select((iota() & np.int32(1)) == np.int32(0), splat(background), EMPTY)
 
 
 @inlined
-def colors_of(halves, first):
-    """Colours of eight samples from `first` on."""
-    k = np.uint64(2) * np.uint64(first)
-    return even_lanes(load(halves, k), load(halves, k + np.uint64(LANES)))
+def clear_samples(first, count, background, halves):
+    """Empty samples from `first` on; up to seven more are cleared, too."""
+    empty = empty_samples(background)
+    for k in range(2 * np.uint64(first), 2 * np.uint64(first + count), LANES):
+        store(halves, k, empty)

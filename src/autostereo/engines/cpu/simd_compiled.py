@@ -15,6 +15,8 @@ from numba.extending import lower_builtin, models, register_model, type_callable
 from . import simd
 from .simd import LANES
 
+binding.initialize_native_asmparser()  # one instruction is written as assembly
+
 SHUFFLES: dict[Callable[..., Any], tuple[int, ...]] = {
     simd.low_halves: (0, 8, 1, 9, 4, 12, 5, 13),
     simd.high_halves: (2, 10, 3, 11, 6, 14, 7, 15),
@@ -195,7 +197,11 @@ def _emit_stream(context, builder, sig, args):
         order = ir.Constant(ir.VectorType(ir.IntType(32), half), [half * k + i for i in range(half)])
         part = builder.shuffle_vector(args[2], args[2], order)
         place = builder.gep(pointer, [ir.Constant(ir.IntType(64), half * k)])
-        builder.store(part, builder.bitcast(place, kind.as_pointer()), align=16).set_metadata("nontemporal", flag)
+        if _has_avx2():  # said outright: LLVM for AVX-512 merges shuffle and store, and forgets to pass the caches
+            call = ir.FunctionType(ir.VoidType(), [place.type, kind])
+            builder.asm(call, "vmovntdq $1, ($0)", "r,x,~{memory}", [place, part], side_effect=True)
+        else:
+            builder.store(part, builder.bitcast(place, kind.as_pointer()), align=16).set_metadata("nontemporal", flag)
     return context.get_dummy_value()
 
 
