@@ -37,8 +37,7 @@ class Groups:
 
 def number_of_groups(job: Job, buffers: SurfelBuffers) -> int:
     """K, or 0 where a method is exact and has no groups."""
-    exact = job.draw.method != "covering-quad" or job.draw.options.alpha == "exact"
-    return 0 if exact else min(job.draw.options.groups, buffers.count)
+    return min(job.draw.options.groups, buffers.count) if job.one_depth else 0
 
 
 def groups_layout(job: Job, count: int, size: tuple[int, int]) -> Layout:
