@@ -38,13 +38,15 @@ class Options:
     alpha : {"exact", "averaged", "minimal"}
         Panels in a single pass, for comparison with 2007's hardware, which had one opacity and one depth for the three
         sub-pixels of a pixel (Hübner 2007b, section 3.6). "averaged": volumes' opacities, and the depths of triangles
-        and points drawn by covering quads, are the mean of the three; "minimal": those depths are the least.
+        and points drawn by `covering-quad`, are the mean of the three; "minimal": those depths are the least.
     volume, step
         For volumes.
     views_per_pass : int, optional
         Method geometry-shader: views that one pass draws; None: as many as the device can.
     groups : int
-        For splats on an OpenGL engine that draws them in groups, as Hübner 2007b does; none does yet.
+        Points by `covering-quad` on the OpenGL engine with an `alpha` that is not "exact": drawn once, in so many
+        groups that each keep the nearest (Hübner 2007b, section 3.5.2). More lose fewer points; each costs a tile of
+        memory the size of the panel, and time to blend it.
     proxy : {"march", "slices"}
         Volumes on the OpenGL engine: a ray march, or view-aligned slices blended back to front (Hübner 2007a).
     """

@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 
 from ...errors import UnsupportedError
 from ...scene.mesh import Mesh
+from ...scene.points import Points
 from ...scene.scene import Scene
 from ...scene.volume import Volume
 from ..engine import Draw, Target
@@ -46,11 +47,13 @@ from .job import Job, Kept
 from .panel import Panel
 from .plane_rasterizer import METHODS as PLANE_METHODS
 from .plane_rasterizer import PlaneMeshes
+from .points import PointClouds
 from .volume import Isosurfaces, Volumes
 
 STAGES: tuple[tuple[type, type[Any]], ...] = (
     (Mesh, PlaneMeshes),
     (Volume, Isosurfaces),
+    (Points, PointClouds),
     (Volume, Volumes),
 )
 METHODS: dict[type, tuple[str, ...]] = {
@@ -59,6 +62,7 @@ METHODS: dict[type, tuple[str, ...]] = {
         *("instanced", "geometry-shader", "geometry-shader-painter", "covering-quad"),
         *PLANE_METHODS,
     ),
+    Points: ("single-pass", "n-pass", "n-pass-subres", "n-pass-masked", "instanced", "covering-quad"),
     Volume: ("single-pass", "n-pass", "n-pass-subres", "n-pass-masked", "covering-quad"),
 }
 PANELS_ONLY = ("n-pass-subres", "n-pass-masked", "covering-quad")

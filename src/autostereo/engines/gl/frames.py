@@ -209,7 +209,7 @@ def _gather_channels(job: Job, stages: list[Stage], panel: Panel, sample: tuple[
     """Draw the sub-pixels of each channel into a tile of their own, and gather them."""
     place = positioned(job, sample)
     job.write_frame(job.draw.camera)
-    tiles = 3 if job.draw.options.alpha == "exact" else 1  # one depth for all three channels
+    tiles = 1 if place.one_depth else 3
     layout = Layout.fitting(tiles, panel.size, job.device.limits)
     atlas = job.kept.get("channels", layout, lambda: Atlas(job.device, layout))
     for first in range(0, tiles, layout.count):

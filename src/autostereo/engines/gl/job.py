@@ -80,8 +80,9 @@ class Job:
 
     @property
     def one_depth(self) -> bool:
-        """Whether the channels of a panel share one tile, and so one depth: `Options.alpha` is not "exact"."""
-        return self.columns is not None and self.draw.options.alpha != "exact"
+        """Whether the channels of a panel share one depth: covering quads, unless `Options.alpha` is "exact"."""
+        quads = self.columns is not None and self.draw.method == "covering-quad"
+        return quads and self.draw.options.alpha != "exact"
 
     def with_atlas(
         self, atlas: Atlas, first: int, count: int, positions: tuple[tuple[float, ...] | None, float] = (None, 0.5)
