@@ -34,7 +34,7 @@ from .volume_setup import (
     prepare_field,
     shown_blocks,
 )
-from .volume_shared import LINE, SLAB_ROWS, Shared
+from .volume_shared import LINE, SLAB_ROWS, SPAN, Shared
 from .volume_views import ISO, MIP, Ways, draw_rows, draw_shared_rows
 
 MODES = ("composite", "mip", "iso")  # in the order of volume_views
@@ -244,7 +244,7 @@ def new_shared(camera: Camera, slices: Slices, offsets: NDArray[np.float64], fin
     """One thread's memory for shared slabs that reach as far as the views see."""
     begin, count = shared_reach(camera, slices, offsets, fine, phases)
     values = np.zeros(SLABS * phases * SLAB_ROWS * LINE, np.float32)
-    return Shared(begin, fine, phases, count, values, np.zeros((SLABS, count // RAYS), np.uint8))
+    return Shared(begin, fine, phases, count, values, np.zeros((SLABS, count // SPAN), np.uint8))
 
 
 def _draw_shared(

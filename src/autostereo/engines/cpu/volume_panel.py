@@ -11,7 +11,7 @@ from .jit import inlined, kernel
 from .panel_lines import row_offsets
 from .volume_rays import END, HALF, LENGTH, ONE, ORIGIN, RAYS, ROW, TURN, ZERO, B, G, R, T
 from .volume_sample import SLABS, hide_runs, keep_alive, mark_runs
-from .volume_shared import ALPHA, LINE, SLAB_ROWS, classify_slabs, shift_of
+from .volume_shared import ALPHA, LINE, SLAB_ROWS, SPAN, classify_slabs, shift_of
 from .volume_views import HIDDEN, PIXELS, mark_volumes, next_slices, over, trace_rays
 
 AT, MOVE, SHARE_R, CUT_R, A0, A1, C0, C1, SUM, THROUGH = (np.uint64(k * ROW) for k in range(10))
@@ -56,7 +56,7 @@ def blend_pixels(blocks, averaged, camera, slices, first, last, shared, pixels, 
             begin = left - max(low * shift, high * shift)
             end = right - min(low * shift, high * shift)
             seen = False
-            for g in range(max(int(begin), 0) // RAYS, min((int(end) + 1) // RAYS, shared.length // RAYS - 1) + 1):
+            for g in range(max(int(begin), 0) // SPAN, min((int(end) + 1) // SPAN, shared.length // SPAN - 1) + 1):
                 seen = seen or shared.shown[k - first, g] != 0
             if not seen:
                 continue

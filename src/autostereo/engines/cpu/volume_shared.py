@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined, kernel
-from .scalars import exp2_fast, log2_fast
+from .scalars import exp2_fast, log2_fast, whole_steps
 from .volume_rays import (
     BACK,
     BACK_LIGHT,
@@ -50,14 +50,15 @@ MAX_LENGTH = 16384  # positions of a phase
 LINE = MAX_LENGTH + 80  # room for the positions of one phase, a constant so that rows are known not to overlap
 RED, GREEN, BLUE, ALPHA = (np.uint64(k * LINE) for k in range(4))
 SLAB_ROWS = 4
+SPAN = 32  # positions of a phase of which it is known whether something is seen
 
 
 class Shared(NamedTuple):
     """Classified slabs of one chunk, one thread's memory.
 
     begin: x of position 0; fine, phases: see above; length: positions of a phase, in whole blocks; values
-    (SLABS · phases · 4 · LINE,) float32: colour times opacity, and opacity; shown (SLABS, blocks) uint8: in which
-    blocks something is seen; the others are zero.
+    (SLABS · phases · 4 · LINE,) float32: colour times opacity, and opacity; shown (SLABS, length / SPAN) uint8: in which
+    spans something is seen; the others are zero.
     """
 
     begin: float
@@ -89,6 +90,17 @@ def start_positions(n, base, first, step, camera, row, far, rays):
         rays[base + END + i] = np.float32(far)
 
 
+@inlined
+def note_shown(base, shown, slab, group, rays):
+    """Note in which spans of a group of positions a slab is seen: SHARE is its opacity."""
+    for part in range(RAYS // SPAN):
+        first, seen = base + SHARE + np.uint64(part * SPAN), np.int32(0)
+        for i in range(np.uint64(SPAN)):
+            seen |= np.int32(rays[first + i] > ZERO)
+        if seen != 0:
+            shown[slab, group * (RAYS // SPAN) + part] = np.uint8(1)
+
+
 @kernel
 def classify_slabs(cut, camera, row, slices, first, last, table, material, light, planes, shared, rays, packed):
     """Fill shared.values with slabs first … last, whose slices are in planes.values from 0 on."""
@@ -99,7 +111,8 @@ def classify_slabs(cut, camera, row, slices, first, last, table, material, light
     material = (np.float32(material[0]), np.float32(material[1]), np.float32(material[2]))
     for g in range(groups):
         for k in range(last - first):
-            shared.shown[k, g] = np.uint8(0)
+            for part in range(g * (RAYS // SPAN), (g + 1) * (RAYS // SPAN)):
+                shared.shown[k, part] = np.uint8(0)
         for phase in range(shared.phases):
             x = shared.begin + (g * RAYS * shared.phases + phase) / shared.fine
             start_positions(n, base, x, shared.phases / shared.fine, camera, row, far, rays)
@@ -141,21 +154,21 @@ def classify_slabs(cut, camera, row, slices, first, last, table, material, light
                     lane = np.uint64(f * ROW)
                     for i in range(n):
                         rays[base + FRONT_LIGHT + lane + i] = rays[base + BACK_LIGHT + lane + i]
-                shared.shown[k - first, g] = np.uint8(1)
+                note_shown(base, shared.shown, k - first, g, rays)
                 fresh = True
 
 
 @inlined
 def next_run(shared, k, j):
     """The next stretch of shown positions of slab k from j on: (first, end); first = length when there is none."""
-    groups = shared.length // RAYS
-    g = j // RAYS
-    while g < groups and shared.shown[k, g] == 0:
+    spans = shared.length // SPAN
+    g = j // SPAN
+    while g < spans and shared.shown[k, g] == 0:
         g += 1
     begin = g
-    while g < groups and shared.shown[k, g] != 0:
+    while g < spans and shared.shown[k, g] != 0:
         g += 1
-    return begin * RAYS, g * RAYS
+    return begin * SPAN, g * SPAN
 
 
 @inlined
@@ -194,8 +207,8 @@ def blend_view(offset, width, camera, slices, first, last, shared, t, line):
             if x0 >= width or begin >= end:
                 break
             if x1 > x0:
-                blend_run(
-                    np.uint64(x1 - x0),
+                blend_run(  # the positions behind, and those behind the picture, do no harm
+                    whole_steps(np.uint64(x1 - x0)),
                     np.uint64(near + begin),
                     np.uint64(beside + begin),
                     part,
