@@ -96,13 +96,25 @@ def test_one_pass_of_exact_rays_is_many_bit_for_bit(engine, scene, rig, name, co
 @given(scenes(modes=("composite",), steep=False), rigs(inside=False))
 @random(25)
 def test_shared_slabs_are_like_many_passes(engine, scene, rig):
-    """Within one level on all but 2 % of what is no outline; outlines are as sharp as positions of slabs are close."""
+    """Noise of a few voxels is the worst case: 8 % more than two levels off, outlines as sharp as slabs are close."""
     need(engine)
     rig = rig.with_views(4)
     one = views(scene, rig, engine, shading="center", step=0.5).color
     many = views(scene, rig, engine, method="n-pass", shading="center", step=0.5).color
-    assert_alike(one, many, where=smooth(many))
+    difference = np.abs(one.astype(int) - many).max(axis=-1)[smooth(many)]
+    assert (difference > 2).sum() <= 0.08 * many[..., 0].size
     assert psnr(one, many) >= 36
+
+
+@pytest.mark.parametrize("content", [samples.shells(32), samples.hydrogen_orbital(32), samples.engine_part(32)])
+def test_shared_slabs_of_samples_are_like_many_passes(engine, content):
+    """Within one level on all but 6 % of what is no outline, at 40 dB all told."""
+    need(engine)
+    rig = aus.Rig(position=(0.4, 0.3, 3.2), fov_y=36, views=4, baseline=0.8)
+    one = views(content, rig, engine, (80, 60), shading="center", step=0.5).color
+    many = views(content, rig, engine, (80, 60), method="n-pass", shading="center", step=0.5).color
+    assert_alike(one, many, 0.06, where=smooth(many))
+    assert psnr(one, many) >= 40
 
 
 @pytest.mark.parametrize("name", ["wavelength-selective", "continuous"])
@@ -236,7 +248,7 @@ def test_homogeneous_boxes_let_through_exp_of_length(engine, rig, seed, volume, 
     error = np.abs(found[..., 3].astype(int) - alpha)[inside]
     assert error.max(initial=0) <= (1 if volume == "exact" else 6)  # lengths in slabs are those of the centre's rays
     assert error.mean() <= 1
-    np.testing.assert_array_equal(found[..., 0], found[..., 3])  # white over black
+    assert np.abs(found[..., 0].astype(int) - found[..., 3]).max() <= 1  # white over black
 
 
 @pytest.mark.parametrize("volume", ["shared", "exact"])
@@ -330,3 +342,20 @@ def test_updates_that_do_not_fit(engine):
     meshes = aus.Renderer(aus.Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [[0, 1, 2]]), engine=engine)
     with pytest.raises(aus.InputError, match="transfer"):
         meshes.update(transfer=mine)
+
+
+def test_overlapping_volumes_where_sub_pixels_share_their_ray(engine):
+    """Without a baseline all sub-pixels of a pixel look along one ray: both volumes are seen on each."""
+    need(engine)
+    gentle = aus.TransferFunction([(0, 1, 0.2, 0, 0.2), (255, 0, 0.5, 1, 2.0)])
+    scene = [
+        replace(samples.shells(16), shade=False, transfer=gentle, transform=aus.transforms.translation(x, 0, 0))
+        for x in (-0.3, 0.3)
+    ]
+    rig = aus.Rig(position=(0.4, 0.3, 3.2), fov_y=36, baseline=0.0)
+    for name in ("wavelength-selective", "table", "one view"):
+        display = DISPLAYS[name]
+        for alpha in ("exact", "averaged"):
+            options = {"step": 0.5, "alpha": alpha, **EXACT}
+            both = [panel(scene, display, rig.with_views(display.views), e, **options) for e in ("reference", engine)]
+            assert_alike(both[1], both[0])

@@ -32,7 +32,7 @@ struct Classified {
     vec4 texel;                          // colour times extinction, extinction
     vec3 reflected, highlight;
 };
-Classified first;                        // on lane 0, for lanes that are as it is
+Classified first[VOLUMES];               // on lane 0, for lanes that are as it is
 
 void begin_slab() {
     optical = LANE(0.0);
@@ -94,16 +94,17 @@ void visit(int v, int l, vec4 voxel) {
     Classified c = classify(v, l, voxel);
     add_to_slab(v, l, c);
     if (l == 0) {
-        first = c;
+        first[v] = c;
     }
 }
 
-// Opacity of the slab, at its end. Lanes that were not looked up are as the first but for their length; so it is with one
-// volume only.
+// Opacity of the slab, at its end. Lanes that were not looked up are as the first but for their length.
 LANE slab_alpha() {
     for (int l = 1; l < LANES; ++l) {
         if (rounds < l + 1) {
-            add_to_slab(0, l, first);
+            for (int v = 0; v < VOLUMES; ++v) {
+                add_to_slab(v, l, first[v]);
+            }
         }
     }
     lit_front = lit_back;
