@@ -159,14 +159,15 @@ def samples_of(prepared: PreparedVolumes, index: int, camera: Camera, cut: Cut) 
     return (int((float(x.max()) - cut.first) / cut.step) + 4 + (1 << CHUNK)) >> CHUNK << CHUNK
 
 
-def new_planes(samples: int, slices: Slices, channels: int) -> Planes:
+def new_planes(samples: int, slices: Slices) -> Planes:
     """One thread's memory for slices."""
     runs = samples >> CHUNK
     return Planes(
-        np.zeros((SLABS + 1, 1 + channels, samples + 1), np.float32),
+        np.zeros((SLABS + 1, samples + 1), np.float32),
         np.zeros((slices.slabs + 1, runs), np.uint8),
         np.zeros((slices.slabs + 1, runs), np.uint8),
         np.zeros(runs, np.uint8),
+        np.zeros(LIST, np.int32),
         np.zeros(LIST, np.int64),
         np.zeros(8 * LIST, np.int32),
         np.zeros(LIST_ROWS * LIST, np.float32),
@@ -182,9 +183,9 @@ def volume_groups(prepared: PreparedVolumes, opaque: bool) -> list[list[int]]:
     return ([composite] if composite else []) + [[k] for k, mode in enumerate(modes) if mode == "mip"]
 
 
-def new_rays(counts: list[int], channels: list[int], slices: Slices) -> tuple[Any, ...]:
+def new_rays(counts: list[int], slices: Slices) -> tuple[Any, ...]:
     """One thread's memory for rays of their own: planes of each volume, a block of rays."""
-    planes = tuple(new_planes(n, slices, c) for n, c in zip(counts, channels, strict=True))
+    planes = tuple(new_planes(n, slices) for n in counts)
     return planes, np.zeros(BLOCK_ROWS * ROW, np.float32), np.zeros(ROW, np.int32)
 
 
@@ -221,11 +222,7 @@ def draw_volume_views(
         made = [make_cut(prepared, index, draw, slices, False, memory) for index in group]
         cuts, ways = tuple(cut for cut, _ in made), tuple(way for _, way in made)
         counts = [samples_of(prepared, index, camera, cut) for index, cut in zip(group, cuts, strict=True)]
-        channels = [way.light[0] for way in ways]
-        pool = memory.pool(
-            (("volume rays", *group), *counts, slices.slabs, *channels),
-            partial(new_rays, counts, channels, slices),
-        )
+        pool = memory.pool((("volume rays", *group), *counts, slices.slabs), partial(new_rays, counts, slices))
         nearest = ends.copy() if apart else depth
 
         def task(
@@ -262,7 +259,6 @@ def _draw_shared(
         fine,
         samples,
         slices,
-        ways.light[0],
         camera.width,
         camera.fx,
         camera.focal,
@@ -271,7 +267,7 @@ def _draw_shared(
     pool = memory.pool(
         key,
         lambda: (
-            new_planes(samples, slices, ways.light[0]),
+            new_planes(samples, slices),
             new_shared(camera, slices, offsets, fine, fine),
             np.zeros(BLOCK_ROWS * ROW, np.float32),
             np.zeros(ROW, np.int32),
@@ -314,8 +310,7 @@ def draw_volume_panel(
         made = [make_cut(prepared, index, draw, own, shared, memory) for index in group]
         cuts, ways = tuple(cut for cut, _ in made), tuple(way for _, way in made)
         counts = [samples_of(prepared, index, camera, cut) for index, cut in zip(group, cuts, strict=True)]
-        channels = [way.light[0] for way in ways]
-        pool = _panel_pool(group, (counts, channels), draw, own, plan if shared else None, memory)
+        pool = _panel_pool(group, counts, draw, own, plan if shared else None, memory)
 
         def task(
             first: int, end: int, cuts: Any = cuts, ways: Any = ways, pool: Any = pool, own: Slices | None = own,
@@ -335,13 +330,13 @@ def draw_volume_panel(
 
 def _panel_pool(
     group: list[int],
-    sizes: tuple[list[int], list[int]],
+    counts: list[int],
     draw: Draw,
     slices: Slices,
     plan: LinePlan | None,
     memory: Memory,
 ) -> Any:
-    """Threads' memory for a panel; sizes = (samples, channels) of each volume's planes; plan: for shared slabs."""
+    """Threads' memory for a panel; counts: samples of each volume's planes; plan: for shared slabs."""
     camera, width = draw.camera, draw.camera.width
     reach = np.zeros(0) if plan is None else np.array([plan.low, plan.high])
 
@@ -354,7 +349,7 @@ def _panel_pool(
             np.zeros(0 if plan is None else PIXEL_ROWS * ROW * 3 * -(-width // RAYS), np.float32),
         )
         slabs = None if plan is None else new_shared(camera, slices, reach, 1, 1)
-        return tuple(new_planes(n, slices, c) for n, c in zip(*sizes, strict=True)), slabs, scratch
+        return tuple(new_planes(n, slices) for n in counts), slabs, scratch
 
-    key = (("volume panel", *group), *sizes[0], *sizes[1], width, slices, camera.fx, camera.focal, reach.tobytes())
+    key = (("volume panel", *group), *counts, width, slices, camera.fx, camera.focal, reach.tobytes())
     return memory.pool(key, make)

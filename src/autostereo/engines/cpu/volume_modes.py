@@ -8,7 +8,6 @@ from .jit import inlined, kernel
 from .volume_rays import (
     BACK,
     FRONT,
-    FRONT_LIGHT,
     HALF,
     ONE,
     ORIGIN,
@@ -42,8 +41,8 @@ def sample_ends(n, base, k, fresh, cut, row, slices, planes, rays):
         for i in range(n):
             rays[base + FRONT + i] = rays[base + BACK + i]
     else:
-        sample_volume(n, base, depth, cut, row, False, planes, FRONT, FRONT_LIGHT, rays)
-    sample_volume(n, base, depth + slices.distance, cut, row, False, planes, BACK, FRONT_LIGHT, rays)
+        sample_volume(n, base, depth, cut, row, planes, FRONT, rays)
+    sample_volume(n, base, depth + slices.distance, cut, row, planes, BACK, rays)
     share_of_slab(n, base, depth, slices.distance, rays)
     trim_ends(n, base, cut, row, depth, slices.distance, rays)
 

@@ -10,16 +10,28 @@ from __future__ import annotations
 import numpy as np
 
 from .jit import inlined, kernel
-from .scalars import exp2_fast, log2_fast
-from .volume_sample import AT, EYE, LAST_ROW, LIGHT, LIST, TINY, VALUE, any_marked, on_slice, sample_points
+from .scalars import exp2_fast, log2_fast, whole_steps
+from .volume_sample import (
+    AT,
+    EYE,
+    LAST_ROW,
+    LIGHT,
+    LIST,
+    TINY,
+    VALUE,
+    any_marked,
+    light_points,
+    on_slice,
+    scalar_points,
+)
 
 RAYS = 128  # of a block
 ROW = 144  # distance of a block's rows
 (
     ORIGIN, TURN, ENTER, LEAVE, LENGTH, T, R, G, B, HALF, FRONT, BACK, OPTICAL, SHARE,
-    PART, LEFT, RIGHT, END, FRONT_LIGHT, BACK_LIGHT, TOTAL, DONE, KEPT,
-) = (np.uint64(k * ROW) for k in (*range(19), 24, 30, 31, 32))  # fmt: skip
-BLOCK_ROWS = 33
+    PART, LEFT, RIGHT, END, LIT, TOTAL, DONE, KEPT,
+) = (np.uint64(k * ROW) for k in (*range(19), 24, 25, 26))  # fmt: skip
+BLOCK_ROWS = 27
 ZERO, ONE, HALF_WAY = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 TEN_BITS, COLOR_STEP = np.int32(1023), np.float32(1.0 / 1023.0)
 OPAQUE = 128  # transmittance in 65536ths, below which a ray has seen enough
@@ -79,29 +91,47 @@ def sample_rays(n, base, line, target, rays, index):
 
 
 @inlined
-def sample_grid(n, base, depth, cut, values, scalar, light, rays, index):
-    """Scalars and light of a sampled slice into rows `scalar` and, by channel, `light` and on."""
-    locate_rays(n, base, depth, cut, values.shape[1], rays, index)
-    sample_rays(n, base, values[0], scalar, rays, index)
-    for f in range(cut.channels):
-        sample_rays(n, base, values[1 + f], light + np.uint64(f * ROW), rays, index)
+def sample_grid(n, base, depth, cut, values, scalar, rays, index):
+    """Scalars of a sampled slice, values (J,), into row `scalar`."""
+    locate_rays(n, base, depth, cut, values.shape[0], rays, index)
+    sample_rays(n, base, values, scalar, rays, index)
 
 
 @kernel
-def sample_volume(n, base, depth, cut, row, own_eyes, planes, scalar, light, rays):
-    """Scalars and light of the volume itself where rays cross a depth, into rows `scalar` and `light` and on."""
-    lists, d, own = planes.lists, np.float32(depth), ONE if own_eyes else ZERO
+def sample_volume(n, base, depth, cut, row, planes, scalar, rays):
+    """Scalars of the volume itself where rays cross a depth, into row `scalar`."""
+    lists, d = planes.lists, np.float32(depth)
     for i in range(n):
         lists[AT + i] = rays[base + ORIGIN + i] + d * rays[base + TURN + i]
-        lists[EYE + i] = own * rays[base + ORIGIN + i]
-    y = row[1] + depth * row[0]
-    sample_points(n, cut, y, depth, on_slice(cut, row, depth), planes.place, planes.words, lists)
+    scalar_points(n, cut, on_slice(cut, row, depth), planes.place, planes.words, lists)
     for i in range(n):
         rays[base + scalar + i] = lists[VALUE + i]
+
+
+@kernel
+def light_slab(n, base, middle, cut, row, own_eyes, planes, rays):
+    """Light at the middle of a slab into LIT, on rays that see it: SHARE is its opacity. Returns whether any does."""
+    lists, chosen, d, own = planes.lists, planes.chosen, np.float32(middle), ONE if own_eyes else ZERO
+    m = np.uint64(0)
+    for i in range(n):
+        chosen[m] = np.int32(i)
+        m += np.uint64(rays[base + SHARE + i] > ZERO)
+    if m == np.uint64(0) or cut.channels == 0:
+        return m > np.uint64(0)
+    whole = whole_steps(m)
+    for j in range(m, whole):
+        chosen[j] = chosen[m - np.uint64(1)]
+    for j in range(whole):
+        i = base + np.uint64(chosen[j])
+        lists[AT + j] = rays[ORIGIN + i] + d * rays[TURN + i]
+        lists[EYE + j] = own * rays[ORIGIN + i]
+    y = row[1] + middle * row[0]
+    light_points(whole, cut, y, middle, on_slice(cut, row, middle), planes.place, planes.words, lists)
     for f in range(cut.channels):
-        to, of = light + np.uint64(f * ROW), LIGHT + np.uint64(f * LIST)
-        for i in range(n):
-            rays[base + to + i] = lists[of + i]
+        to, of = base + LIT + np.uint64(f * ROW), LIGHT + np.uint64(f * LIST)
+        for j in range(m):
+            rays[to + np.uint64(chosen[j])] = lists[of + j]
+    return True
 
 
 @inlined
@@ -192,10 +222,10 @@ def reflect(light, material, colors, specular, base, i, c, rays):
     row = np.uint64(ROW)
     d = np.uint64(c if colors == 3 else 0) * row
     s = np.uint64(colors + (c if colors == 3 else 0)) * row
-    factor = ambient + diffuse * HALF_WAY * (rays[base + FRONT_LIGHT + d + i] + rays[base + BACK_LIGHT + d + i])
+    factor = ambient + diffuse * rays[base + LIT + d + i]
     added = ZERO
     if specular:
-        added = shine * HALF_WAY * (rays[base + FRONT_LIGHT + s + i] + rays[base + BACK_LIGHT + s + i])
+        added = shine * rays[base + LIT + s + i]
     return factor, added
 
 
@@ -205,10 +235,10 @@ def blend(n, base, material, light, rays, packed):
     ambient, diffuse, _ = material
     channels, colors = light
     if channels <= 1:
-        a, d = (ambient, diffuse * HALF_WAY) if channels == 1 else (ONE, ZERO)
+        a, d = (ambient, diffuse) if channels == 1 else (ONE, ZERO)
         for i in range(n):
             w = rays[base + T + i] * rays[base + SHARE + i]
-            factor = w * COLOR_STEP * (a + d * (rays[base + FRONT_LIGHT + i] + rays[base + BACK_LIGHT + i]))
+            factor = w * COLOR_STEP * (a + d * rays[base + LIT + i])
             c = packed[i]
             rays[base + R + i] += factor * np.float32(c & TEN_BITS)
             rays[base + G + i] += factor * np.float32((c >> np.int32(10)) & TEN_BITS)
@@ -275,8 +305,8 @@ def is_seen(n, base, cut, slices, k, planes, rays):
 def add_optical(n, base, cut, row, slices, k, way, planes, rays, packed):
     """Add the optical depth of slab k of one of several volumes to TOTAL."""
     depth = slices.first + k * slices.distance
-    sample_volume(n, base, depth, cut, row, False, planes, FRONT, FRONT_LIGHT, rays)
-    sample_volume(n, base, depth + slices.distance, cut, row, False, planes, BACK, FRONT_LIGHT, rays)
+    sample_volume(n, base, depth, cut, row, planes, FRONT, rays)
+    sample_volume(n, base, depth + slices.distance, cut, row, planes, BACK, rays)
     share_of_slab(n, base, depth, slices.distance, rays)
     trim_ends(n, base, cut, row, depth, slices.distance, rays)
     classify(n, base, way.table.extinction, way.table.color, rays, packed)
@@ -318,8 +348,8 @@ def march(n, base, cut, row, slices, first, last, way, wants_half, among, planes
             fresh = False
             continue
         if not fresh:
-            sample_volume(n, base, depth, cut, row, way.own_eyes, planes, FRONT, FRONT_LIGHT, rays)
-        sample_volume(n, base, after, cut, row, way.own_eyes, planes, BACK, BACK_LIGHT, rays)
+            sample_volume(n, base, depth, cut, row, planes, FRONT, rays)
+        sample_volume(n, base, after, cut, row, planes, BACK, rays)
         share_of_slab(n, base, depth, slices.distance, rays)
         trim_ends(n, base, cut, row, depth, slices.distance, rays)
         classify(n, base, way.table.extinction, way.table.color, rays, packed)
@@ -330,16 +360,13 @@ def march(n, base, cut, row, slices, first, last, way, wants_half, among, planes
         else:
             for i in range(n):
                 rays[base + SHARE + i] = ONE - exp2_fast(-rays[base + SHARE + i])
-        if wants_half:
-            for i in range(n):
-                rays[base + OPTICAL + i] = rays[base + T + i]
-        blend(n, base, material, way.light, rays, packed)
-        if wants_half:
-            find_half(n, base, depth, slices.distance, rays)
+        if light_slab(n, base, 0.5 * (depth + after), cut, row, way.own_eyes, planes, rays):
+            if wants_half:
+                for i in range(n):
+                    rays[base + OPTICAL + i] = rays[base + T + i]
+            blend(n, base, material, way.light, rays, packed)
+            if wants_half:
+                find_half(n, base, depth, slices.distance, rays)
         for i in range(n):
             rays[base + FRONT + i] = rays[base + BACK + i]
-        for f in range(way.light[0]):
-            lane = np.uint64(f * ROW)
-            for i in range(n):
-                rays[base + FRONT_LIGHT + lane + i] = rays[base + BACK_LIGHT + lane + i]
         fresh = True

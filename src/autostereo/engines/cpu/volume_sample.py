@@ -1,9 +1,9 @@
 """One image row of a volume: all rays of all views lie in one plane, on which the volume is sampled once.
 
 The plane is cut by slices of constant eye depth d_k, the same for all views (Hübner 2007a, section 3.2). On each
-slice scalars and gradients are interpolated trilinearly at evenly spaced X, a quarter to half of a voxel apart, and
-lit; whatever a ray of any view needs is then an interpolation between two neighbours. Runs of 16 samples in which no
-block of voxels shows anything get one scalar each.
+slice scalars are interpolated trilinearly at evenly spaced X, a quarter to half of a voxel apart; whatever a ray of any
+view needs is then an interpolation between two neighbours. Runs of 16 samples in which no block of voxels shows
+anything get one scalar each. Gradients are interpolated and lit only where something is seen.
 """
 
 from __future__ import annotations
@@ -61,15 +61,16 @@ class Cut(NamedTuple):
 class Planes(NamedTuple):
     """One thread's memory for the slices at hand.
 
-    values (SLABS + 1, fields, J) float32: table rows, then channels of light; marks, wanted (all slices, J / 16)
-    uint8: runs in which something shows, and runs that are to be sampled; alive (J / 16,) uint8: runs that are not yet
-    hidden; place (LIST,) int64, words int32, lists float32: scratch for the samples of a run.
+    values (SLABS + 1, J) float32: table rows; marks, wanted (all slices, J / 16) uint8: runs in which something shows,
+    and runs that are to be sampled; alive (J / 16,) uint8: runs that are not yet hidden; chosen (LIST,) int32: rays
+    that are lit; place (LIST,) int64, words int32, lists float32: scratch for the samples of a run.
     """
 
     values: np.ndarray
     marks: np.ndarray
     wanted: np.ndarray
     alive: np.ndarray
+    chosen: np.ndarray
     place: np.ndarray
     words: np.ndarray
     lists: np.ndarray
@@ -252,39 +253,39 @@ def light_samples(n, cut, y, depth, lists):
 
 
 @inlined
-def sample_points(n, cut, y, depth, start, place, words, lists):
-    """Scalars, as rows of the table, into VALUE, and light into LIGHT and on, of n ≤ 256 samples at X = AT.
+def scalar_points(n, cut, start, place, words, lists):
+    """Scalars, as rows of the table, into VALUE, of n ≤ 256 samples at X = AT; start: see light_points."""
+    m = cut.from_eye
+    locate(n, start, (m[0, 0], m[1, 0], m[2, 0]), cut.shape, place, lists)
+    bring(n, cut.scalars, cut.shape, place, words)
+    interpolate_words(n, VALUE, words, lists)
+    low, scale = np.float32(cut.low), np.float32(cut.scale)
+    for i in range(n):
+        lists[VALUE + i] = min(max((lists[VALUE + i] - low) * scale, ZERO), LAST_ROW)
+
+
+@inlined
+def light_points(n, cut, y, depth, start, place, words, lists):
+    """Light into LIGHT and on, of n ≤ 256 samples at X = AT, highlights for the eyes at EYE.
 
     start: index coordinates of X = 0 at this Y and depth (on_slice).
     """
     m = cut.from_eye
     locate(n, start, (m[0, 0], m[1, 0], m[2, 0]), cut.shape, place, lists)
-    low, scale = np.float32(cut.low), np.float32(cut.scale)
-    together = cut.channels > 0 and cut.scalars.itemsize == 1
-    if not together:
-        bring(n, cut.scalars, cut.shape, place, words)
-        interpolate_words(n, VALUE, words, lists)
-    if cut.channels > 0:
-        bring(n, cut.words, cut.shape, place, words)
-        bits, mask = (np.int32(8), np.int32(255)) if cut.scalars.itemsize == 1 else (np.int32(10), np.int32(1023))
-        interpolate_parts(n, np.int32(0), mask, NX, words, lists)
-        interpolate_parts(n, bits, mask, NY, words, lists)
-        interpolate_parts(n, bits + bits, mask, NZ, words, lists)
-    if together:
-        interpolate_parts(n, np.int32(24), np.int32(255), VALUE, words, lists)
-        low -= np.float32(128.0)
-    for i in range(n):
-        lists[VALUE + i] = min(max((lists[VALUE + i] - low) * scale, ZERO), LAST_ROW)
-    if cut.channels > 0:
-        light_samples(n, cut, y, depth, lists)
+    bring(n, cut.words, cut.shape, place, words)
+    bits, mask = (np.int32(8), np.int32(255)) if cut.scalars.itemsize == 1 else (np.int32(10), np.int32(1023))
+    interpolate_parts(n, np.int32(0), mask, NX, words, lists)
+    interpolate_parts(n, bits, mask, NY, words, lists)
+    interpolate_parts(n, bits + bits, mask, NZ, words, lists)
+    light_samples(n, cut, y, depth, lists)
 
 
 @kernel
 def sample_slice(cut, row, slices, k, planes, into):
-    """Sample slice k into planes.values[into], lit for the centre eye; unwanted runs get the scalar of their middle."""
+    """Sample slice k into planes.values[into]; unwanted runs get the scalar of their middle."""
     runs = planes.wanted.shape[1]
     depth = slices.first + k * slices.distance
-    start, y = on_slice(cut, row, depth), row[1] + depth * row[0]
+    start = on_slice(cut, row, depth)
     values, place, lists = planes.values, planes.place, planes.lists
     m = cut.from_eye
     c = 0
@@ -299,17 +300,14 @@ def sample_slice(cut, row, slices, k, planes, into):
             lists[AT] = first + np.float32(1 << (CHUNK - 1)) * step
             locate(np.uint64(1), start, (m[0, 0], m[1, 0], m[2, 0]), cut.shape, place, lists)
             value = np.float32((np.float64(cut.scalars[np.uint64(place[0])]) - cut.low) * cut.scale)
-            values[into, 0, j : j + (1 << CHUNK)] = min(max(value, ZERO), LAST_ROW)
+            values[into, j : j + (1 << CHUNK)] = min(max(value, ZERO), LAST_ROW)
         else:
             for i in range(n):
                 lists[AT + i] = first + np.float32(i) * step
-                lists[EYE + i] = ZERO
-            sample_points(n, cut, y, depth, start, place, planes.words, lists)
-            for f in range(1 + cut.channels):
-                first = VALUE if f == 0 else LIGHT + np.uint64((f - 1) * LIST)
-                line = values[into, f, j:]
-                for i in range(n):
-                    line[i] = lists[first + i]
+            scalar_points(n, cut, start, place, planes.words, lists)
+            line = values[into, j:]
+            for i in range(n):
+                line[i] = lists[VALUE + i]
         c = end
 
 

@@ -19,16 +19,13 @@ from .jit import inlined, kernel
 from .scalars import exp2_fast, log2_fast, whole_steps
 from .volume_rays import (
     BACK,
-    BACK_LIGHT,
     END,
     FRONT,
-    FRONT_LIGHT,
     LENGTH,
     ONE,
     OPTICAL,
     ORIGIN,
     RAYS,
-    ROW,
     SHARE,
     TURN,
     ZERO,
@@ -39,6 +36,7 @@ from .volume_rays import (
     blend,
     block_bounds,
     classify,
+    light_slab,
     ray_stretch,
     sample_grid,
     seen,
@@ -57,8 +55,8 @@ class Shared(NamedTuple):
     """Classified slabs of one chunk, one thread's memory.
 
     begin: x of position 0; fine, phases: see above; length: positions of a phase, in whole blocks; values
-    (SLABS · phases · 4 · LINE,) float32: colour times opacity, and opacity; shown (SLABS, length / SPAN) uint8: in which
-    spans something is seen; the others are zero.
+    (SLABS · phases · 4 · LINE,) float32: colour times opacity, and opacity; shown (SLABS, length / SPAN) uint8: in
+    which spans something is seen; the others are zero.
     """
 
     begin: float
@@ -130,9 +128,8 @@ def classify_slabs(cut, camera, row, slices, first, last, table, material, light
                             shared.values[clear + i] = ZERO
                     continue
                 if not fresh:
-                    sample_grid(n, base, depth, cut, planes.values[k - first], FRONT, FRONT_LIGHT, rays, packed)
-                values = planes.values[k - first + 1]
-                sample_grid(n, base, depth + slices.distance, cut, values, BACK, BACK_LIGHT, rays, packed)
+                    sample_grid(n, base, depth, cut, planes.values[k - first], FRONT, rays, packed)
+                sample_grid(n, base, after, cut, planes.values[k - first + 1], BACK, rays, packed)
                 share_of_slab(n, base, depth, slices.distance, rays)
                 trim_ends(n, base, cut, row, depth, slices.distance, rays)
                 classify(n, base, table.extinction, table.color, rays, packed)
@@ -143,17 +140,14 @@ def classify_slabs(cut, camera, row, slices, first, last, table, material, light
                     rays[base + R + i] = ZERO
                     rays[base + G + i] = ZERO
                     rays[base + B + i] = ZERO
-                blend(n, base, material, light, rays, packed)
+                if light_slab(n, base, 0.5 * (depth + after), cut, row, False, planes, rays):
+                    blend(n, base, material, light, rays, packed)
                 for i in range(n):
                     shared.values[place + RED + i] = rays[base + R + i]
                     shared.values[place + GREEN + i] = rays[base + G + i]
                     shared.values[place + BLUE + i] = rays[base + B + i]
                     shared.values[place + ALPHA + i] = rays[base + SHARE + i]
                     rays[base + FRONT + i] = rays[base + BACK + i]
-                for f in range(light[0]):
-                    lane = np.uint64(f * ROW)
-                    for i in range(n):
-                        rays[base + FRONT_LIGHT + lane + i] = rays[base + BACK_LIGHT + lane + i]
                 note_shown(base, shared.shown, k - first, g, rays)
                 fresh = True
 
