@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +14,6 @@ from autostereo.cli.benchmarks import harness, papers, papers_published, papers_
 from autostereo.cli.benchmarks.papers_studio import PapersStudio, Way
 from autostereo.cli.benchmarks.suite import BenchOptions, Work
 from autostereo.display.display import Display
-from autostereo.engines import engine as engines
 from autostereo.errors import DependencyError, InputError
 from autostereo.render import Renderer
 from autostereo.scene.scene import Scene
@@ -110,6 +110,14 @@ def test_ratios_and_shares_are_those_of_the_rates(measured):
     assert ratio["bar"] == "≥ 2.5" and ratio["met"] is None  # quick: held to no bar
 
 
+def test_what_approximations_lose_is_told_apart(measured):
+    for scene in papers.WORKS["alpha"].scenes:
+        lost = {f["measure"]: f["value"] for f in measured.results if (f["work"], f["scene"]) == ("alpha", scene)}
+        assert lost.pop("PSNR of exact opacity") > 60  # the same rays in one pass
+        assert set(lost) == {f"PSNR of {name}" for name in ("averaged opacity", "MV sub-res", "shared lookups")}
+        assert all(value < 60 for value in lost.values()), (scene, lost)
+
+
 def test_a_frame_after_the_first_sends_no_scene_data(measured):
     sent = [f for f in measured.results if f["work"] == "uploads"]
     assert len(sent) == 7 and {f["value"] for f in sent} == {0.0}
@@ -133,10 +141,15 @@ def test_charts_are_pictures(measured):
 
 
 def test_without_a_device_everything_is_reported_as_not_available(monkeypatch, capsys):
-    def missing():
-        raise DependencyError("engine gl gets no OpenGL context")
+    door = sys.modules["autostereo.render"]
+    get_engine = door.get_engine
 
-    monkeypatch.setitem(engines.ENGINES, "gl", missing)
+    def missing(name, scene=None):
+        if name == "gl":
+            raise DependencyError("engine gl gets no OpenGL context")
+        return get_engine(name, scene)
+
+    monkeypatch.setattr(door, "get_engine", missing)
     monkeypatch.setattr(PapersStudio, "device", None)
     results = report.bench("papers", quick("2008-table3"), None, silent)
     refused = [f for f in results if f["value"] is None]
