@@ -226,10 +226,11 @@ def test_no_round_begins_after_the_limit(monkeypatch):
         now.frames += 1
 
     contender = harness.Contender("a", frame, scale=2.0)
-    assert harness.measure([contender], 5, limit=5, warm=True)["a"].seconds == (6.0,)
-    assert now.frames == 2  # one to find how many frames, one round
+    times = harness.measure([contender], 5, least=2, limit=10, warm=True)["a"]
+    assert (times.seconds, times.frames) == ((6.0, 6.0), 2)
+    assert now.frames == 5  # one to find how many frames, two rounds: the second begins after 9 s, no third after 15
     assert harness.measure([contender], 5, limit=2, warm=True)["a"].seconds == (6.0,)
-    assert now.frames == 3  # none: the first is the figure
+    assert now.frames == 7  # one round there always is
 
 
 def test_pictures_stay_on_the_device_only_meanwhile():

@@ -84,7 +84,12 @@ class Times:
 
 
 def measure(
-    contenders: Sequence[Contender], repeats: int, minimum: float = 0.1, limit: float = math.inf, warm: bool = False
+    contenders: Sequence[Contender],
+    repeats: int,
+    minimum: float = 0.1,
+    least: int = 1,
+    limit: float = math.inf,
+    warm: bool = False,
 ) -> dict[str, Times]:
     """Measure all contenders in turns.
 
@@ -96,8 +101,10 @@ def measure(
         Rounds.
     minimum : float
         Seconds that one turn should last: short frames are repeated, up to 64 in a row, and the time is divided.
+    least : int
+        Frames that one turn should have at least, however long they are.
     limit : float
-        Seconds after which no round is begun any more. If none was, the figures are those of the second run.
+        Seconds after which no round but the first is begun any more.
     warm : bool
         They have all been run already.
 
@@ -107,16 +114,17 @@ def measure(
     """
     try:
         begin = time.perf_counter()
-        for contender in contenders if not warm else ():
-            _turn(contender, 1)
+        if not warm:
+            for contender in contenders:
+                _turn(contender, 1)
         once = [_turn(contender, 1) for contender in contenders]
-        frames = [min(MAX_FRAMES, max(1, math.ceil(minimum / max(spent, 1e-9)))) for spent in once]
+        frames = [min(MAX_FRAMES, max(least, math.ceil(minimum / max(spent, 1e-9)))) for spent in once]
         seconds: list[list[float]] = [[] for _ in contenders]
         collecting = gc.isenabled()
         gc.disable()
         try:
             for turn in range(repeats):
-                if time.perf_counter() - begin >= limit:
+                if turn > 0 and time.perf_counter() - begin >= limit:
                     break
                 order = range(len(contenders))
                 for k in reversed(order) if turn % 2 else order:
@@ -127,9 +135,6 @@ def measure(
     finally:
         for contender in contenders:
             contender.release()
-    if not all(seconds):
-        seconds = [[c.scale * spent] for c, spent in zip(contenders, once, strict=True)]
-        frames = [1 for _ in contenders]
     return {c.name: Times(tuple(s), n, c.scale) for c, s, n in zip(contenders, seconds, frames, strict=True)}
 
 

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from ...engines.gl.context import Device
     from ...render import Renderer
 
+FRAMES = 3  # in a row at least: threads of software OpenGL are idle at the end of a lone one
 LIMIT = 6.0  # seconds of one table's row after which no round is begun any more
 CPU = "cpu engine"
 
@@ -86,7 +87,7 @@ class Row:
         """How many times faster `fast` is, beside the paper's figure if it has both."""
         rates = self.published
         paper = rates[fast] / rates[slow] if slow in rates and fast in rates else None
-        reason = "; ".join(self.refused[name] for name in (slow, fast) if name in self.refused)
+        reason = "; ".join(dict.fromkeys(self.refused[name] for name in (slow, fast) if name in self.refused))
         value = (math.nan,) * 3 if reason else band(ratio, self.times[slow], self.times[fast])
         return self._figure(f"{slow} / {fast}", value, "×", note=reason or note, published=paper, bar=bar)
 
@@ -153,9 +154,9 @@ class PapersStudio:
             except Exception as error:  # a driver's: one table less, not the end
                 refused[way.name] = f"failed: {type(error).__name__}: {(str(error).splitlines() or [''])[0]}"
         repeats = self.options.repeats or (1 if self.options.quick else 3)
-        minimum = 0.0 if self.options.quick else 0.1
+        minimum, least = (0.0, 1) if self.options.quick else (0.1, FRAMES)
         with self.device.without_reading() if self.device is not None else nullcontext():
-            times = measure(contenders, repeats, minimum, LIMIT, warm=True)
+            times = measure(contenders, repeats, minimum, least, LIMIT, warm=True)
         return Row(work, name, times, refused, published or {})
 
     def picture_or_why(self, scene: Scene, way: Way) -> tuple[NDArray[np.uint8] | None, str]:
