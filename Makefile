@@ -1,6 +1,6 @@
 # make demo   render the built-in scenes for several displays into demo/
 # make test   install what is missing, check style, types and the import law, run all tests
-# make bench  measure meshes, volumes and points (bench-*.json); needs the peers of `pip install .[bench]`
+# make bench  measure meshes, volumes, points and the papers' tables (bench-*.json); needs the peers of `pip install .[bench]`
 # make clean  remove what the others made
 
 PYTHON ?= python3
@@ -26,6 +26,7 @@ bench: $(VENV)/bench
 	$(BIN)/autostereo bench mesh --json bench-mesh.json
 	$(BIN)/autostereo bench volume --json bench-volume.json
 	$(BIN)/autostereo bench points --json bench-points.json
+	$(BIN)/autostereo bench papers --json bench-papers.json
 
 clean:
 	rm -rf $(VENV) demo build bench-*.json .pytest_cache .hypothesis .mypy_cache .ruff_cache .import_linter_cache

@@ -14,21 +14,28 @@ KERNELS = {  # by which one sees whether this run compiles
     "mesh": ("draw_views", "draw_panel"),
     "volume": ("draw_shared_rows", "draw_panel_rows"),
     "points": ("splat_",),
+    "papers": ("draw_views", "draw_panel", "draw_shared_rows", "draw_panel_rows", "splat_"),
 }
 
 
 def bench(
     name: Annotated[
-        str, typer.Argument(metavar="WHAT", help="What to measure: mesh, volume or points.")
+        str, typer.Argument(metavar="WHAT", help="What to measure: mesh, volume, points or papers.")
     ] = "mesh",
     json: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Also write the figures here.")] = None,
     only: Annotated[list[str] | None, typer.Option("--only", metavar="WORK", help="Only this; repeatable.")] = None,
     repeats: Annotated[
-        int | None, typer.Option("--repeats", metavar="N", help="Rounds; 7, or 3 with --quick.")
+        int | None, typer.Option("--repeats", metavar="N", help="Rounds; 7, or 3 with --quick; papers: 3, 1.")
     ] = None,
     data: Annotated[
         Path | None,
-        typer.Option("--data", metavar="DIR", help="Folder with meshes/bun_zipper.ply (Stanford bunny), for mesh."),
+        typer.Option("--data", metavar="DIR", help="Folder with meshes/bun_zipper.ply (mesh), volumes/… (papers)."),
+    ] = None,
+    budget: Annotated[
+        float | None, typer.Option("--budget", metavar="SECONDS", help="Begin no work any more after this time.")
+    ] = None,
+    plots: Annotated[
+        Path | None, typer.Option("--plots", metavar="DIR", help="Charts (PNG) of papers, as the papers have them.")
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Small pictures, three rounds: shows that it works.")] = False,
     quiet: common.Quiet = False,
@@ -37,21 +44,26 @@ def bench(
 
     Rendering in one pass is compared with one render per view: by this engine (volume, points) and by the usual loops
     in moderngl (mesh) and VTK (mesh, volume), if they are installed (pip install autostereo[bench]). Ratios are of
-    medians, in one run.
+    medians, in one run. papers: the tables of the papers that engine gl follows, beside their printed figures.
 
     Examples:
       autostereo bench mesh --quick
       autostereo bench mesh --data data --json bench.json
       autostereo bench volume --only views-48 --only panels-8 --repeats 15
       autostereo bench points
+      autostereo bench papers --only 2007a-table1 --json papers.json --plots charts
     """
     if name not in KERNELS:
         raise InputError(f"bench: expected one of {', '.join(KERNELS)}, got {name!r}")
     if json is not None:
         common.check_output(json, (".json",))
+    if plots is not None and name != "papers":
+        raise InputError(f"bench --plots: only papers has charts, got {name!r}")
     from .benchmarks import report
     from .benchmarks.suite import BenchOptions
 
-    options = BenchOptions(quick=quick, only=tuple(only or ()), data=data, repeats=repeats)
+    options = BenchOptions(quick=quick, only=tuple(only or ()), data=data, repeats=repeats, budget=budget)
     common.announce_compilation("cpu", *KERNELS[name])
-    report.bench(name, options, json, common.note)
+    results = report.bench(name, options, json, common.note)
+    if plots is not None:
+        report.plot(plots, results)

@@ -83,7 +83,14 @@ class Times:
         }
 
 
-def measure(contenders: Sequence[Contender], repeats: int, minimum: float = 0.1) -> dict[str, Times]:
+def measure(
+    contenders: Sequence[Contender],
+    repeats: int,
+    minimum: float = 0.1,
+    least: int = 1,
+    limit: float = math.inf,
+    warm: bool = False,
+) -> dict[str, Times]:
     """Measure all contenders in turns.
 
     Parameters
@@ -94,22 +101,31 @@ def measure(contenders: Sequence[Contender], repeats: int, minimum: float = 0.1)
         Rounds.
     minimum : float
         Seconds that one turn should last: short frames are repeated, up to 64 in a row, and the time is divided.
+    least : int
+        Frames that one turn should have at least, however long they are.
+    limit : float
+        Seconds after which no round but the first is begun any more.
+    warm : bool
+        They have all been run already.
 
     Returns
     -------
     dict of Times by contender's name
     """
     try:
-        for contender in contenders:
-            _turn(contender, 1)
-        frames = [
-            min(MAX_FRAMES, max(1, math.ceil(minimum / max(_turn(contender, 1), 1e-9)))) for contender in contenders
-        ]
+        begin = time.perf_counter()
+        if not warm:
+            for contender in contenders:
+                _turn(contender, 1)
+        once = [_turn(contender, 1) for contender in contenders]
+        frames = [min(MAX_FRAMES, max(least, math.ceil(minimum / max(spent, 1e-9)))) for spent in once]
         seconds: list[list[float]] = [[] for _ in contenders]
         collecting = gc.isenabled()
         gc.disable()
         try:
             for turn in range(repeats):
+                if turn > 0 and time.perf_counter() - begin >= limit:
+                    break
                 order = range(len(contenders))
                 for k in reversed(order) if turn % 2 else order:
                     seconds[k].append(contenders[k].scale * _turn(contenders[k], frames[k]))
@@ -158,7 +174,9 @@ class Figure:
     measure : str
         What `value` is, e.g. "moderngl / autostereo".
     value, low, high : float
-        The number and its noise band.
+        The number and its noise band; NaN where it could not be had, `note` says why.
+    published : float, optional
+        What the paper has, where a table of a paper is reproduced.
     unit : str
     bar : Bar, optional
         What is asked, if anything.
@@ -177,22 +195,24 @@ class Figure:
     bar: Bar | None = None
     times: dict[str, Times] | None = None
     note: str = ""
+    published: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain numbers and strings, ready for JSON."""
+        """Plain numbers and strings, ready for JSON; a number that could not be had is None."""
         return {
             "work": self.work,
             "scene": self.scene,
             "lighting": self.lighting,
             "measure": self.measure,
-            "value": self.value,
-            "low": self.low,
-            "high": self.high,
+            "value": None if math.isnan(self.value) else self.value,
+            "low": None if math.isnan(self.low) else self.low,
+            "high": None if math.isnan(self.high) else self.high,
             "unit": self.unit,
             "bar": None if self.bar is None else str(self.bar),
             "met": None if self.bar is None else self.bar.met_by(self.value),
             "times": {name: times.as_dict() for name, times in (self.times or {}).items()},
             "note": self.note,
+            "published": self.published,
         }
 
 

@@ -15,7 +15,7 @@ from . import jobs, workloads
 from .contenders import OURS, VTK, coverage
 from .harness import Bar, Contender, Figure, Measured, Times, band, machine_facts, measure, ratio
 from .mesh_contenders import MODERNGL, MeshStudio
-from .suite import BenchOptions, Say, Work, check_works, run_works
+from .suite import BenchOptions, Keep, Results, Say, Work, check_works, run_works
 
 if TYPE_CHECKING:
     from ...display.display import Display
@@ -42,7 +42,7 @@ DISPLAYS: dict[str, Callable[[Size], Display]] = {
 }
 
 
-def run(options: BenchOptions | None = None, say: Say = print) -> list[dict[str, Any]]:
+def run(options: BenchOptions | None = None, say: Say = print, keep: Keep = lambda results: None) -> Results:
     """Measure every work of `options` and return its figures.
 
     Parameters
@@ -50,6 +50,8 @@ def run(options: BenchOptions | None = None, say: Say = print) -> list[dict[str,
     options : BenchOptions
     say : callable
         Is told in one line what is being measured and what is left out.
+    keep : callable
+        Is given all figures so far, after each work.
 
     Returns
     -------
@@ -64,7 +66,7 @@ def run(options: BenchOptions | None = None, say: Say = print) -> list[dict[str,
     options = options or BenchOptions()
     check_works("mesh", WORKS, options.only)
     without = () if _has_bunny(options, say) else ("bunny",)
-    return run_works(WORKS, MeshStudio(options, say), options, say, without)
+    return run_works(WORKS, MeshStudio(options, say), options, say, without, keep)
 
 
 def facts(options: BenchOptions | None = None) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from ...scene.scene import Scene
 from . import workloads
 from .contenders import NPASS, OURS, Studio, coverage
 from .harness import Bar, Figure, Measured, machine_facts, measure, unlike
-from .suite import BenchOptions, Say, Work, check_works, run_works
+from .suite import BenchOptions, Keep, Results, Say, Work, check_works, run_works
 from .workloads import Size
 
 SURFELS = 1_000_000
@@ -32,7 +32,7 @@ class PointStudio(Studio):
         return self._scene
 
 
-def run(options: BenchOptions | None = None, say: Say = print) -> list[dict[str, Any]]:
+def run(options: BenchOptions | None = None, say: Say = print, keep: Keep = lambda results: None) -> Results:
     """Measure every work of `options` and return its figures; see `mesh.run`.
 
     Raises
@@ -44,7 +44,7 @@ def run(options: BenchOptions | None = None, say: Say = print) -> list[dict[str,
     """
     options = options or BenchOptions()
     check_works("points", WORKS, options.only)
-    return run_works(WORKS, PointStudio(options, say), options, say)
+    return run_works(WORKS, PointStudio(options, say), options, say, keep=keep)
 
 
 def facts(options: BenchOptions | None = None) -> dict[str, Any]:

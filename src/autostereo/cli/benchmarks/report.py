@@ -9,12 +9,13 @@ from types import ModuleType
 from typing import Any
 
 from ...image import write_atomic
-from . import mesh, points, volume
+from . import mesh, papers, points, volume
 from .suite import BenchOptions, Say
 
 Results = Sequence[dict[str, Any]]
 
-SUITES: dict[str, ModuleType] = {"mesh": mesh, "volume": volume, "points": points}  # each has WORKS, run, facts
+# each has WORKS, run, facts
+SUITES: dict[str, ModuleType] = {"mesh": mesh, "volume": volume, "points": points, "papers": papers}
 
 
 def bench(name: str, options: BenchOptions, path: Path | None = None, say: Say = print) -> Results:
@@ -22,18 +23,22 @@ def bench(name: str, options: BenchOptions, path: Path | None = None, say: Say =
 
     Parameters
     ----------
-    name : {"mesh", "volume", "points"}
+    name : {"mesh", "volume", "points", "papers"}
     options : BenchOptions
     path : Path, optional
-        Written when all is measured.
+        Written after each work, so that what is measured stays when a later one fails.
     say : callable
         Is told in one line what is being measured and what is left out.
     """
     suite = SUITES[name]
     facts = suite.facts(options)  # before the run, whose own load does not count
-    results = suite.run(options, say)
-    if path is not None:
-        save(path, results, facts)
+
+    def keep(found: Results) -> None:
+        if path is not None:
+            save(path, found, facts)
+
+    results = suite.run(options, say, keep)
+    keep(results)
     show(results, facts)
     return results
 
@@ -48,7 +53,7 @@ def show(results: Results, facts: dict[str, Any]) -> None:
     for line in describe(facts):
         console.print(line, highlight=False)
     console.print(_figures(results))
-    if any(figure["times"] for figure in results):
+    if any(figure["times"] and figure["unit"] != "fps" for figure in results):  # rates say it already
         console.print(_times(results))
     asked = [figure for figure in results if figure["met"] is not None]
     console.print(f"{sum(figure['met'] for figure in asked)} of {len(asked)} bars met", highlight=False)
@@ -63,6 +68,10 @@ def describe(facts: dict[str, Any]) -> list[str]:
     ]
     if "opengl" in facts:
         lines.append(f"OpenGL of the peers: {facts['opengl'] or 'none'}")
+    if "device" in facts:
+        device = facts["device"]
+        kind = "" if device is None else ", a GPU" if device["hardware"] else ", software: the CPU draws"
+        lines.append(f"OpenGL: {device['renderer'] if device else 'none'}{kind}")
     if facts["load"] is not None and facts["load"] > 0.5:
         lines.append("This machine is busy with other things: the figures say little.")
     return lines
@@ -90,19 +99,22 @@ def _where(results: Results) -> list[str]:
 def _figures(results: Results) -> Any:
     from rich.table import Table
 
-    where = _where(results)
+    where, printed = _where(results), any(f["published"] is not None for f in results)
     table = Table(title="figures: ratios of medians, with the smallest and largest of a round")
     for heading in (*(WORDS[field] for field in where), "measure"):
         table.add_column(heading)
-    for heading in ("asked", "reached", "noise"):
+    for heading in (*(("paper",) if printed else ()), "asked", "reached", "noise"):
         table.add_column(heading, justify="right")
     table.add_column("met")
     table.add_column("note")
     for f in results:
         met = "" if f["met"] is None else "yes" if f["met"] else "[bold red]no[/]"
-        noise = f"{number(f['low'])} … {number(f['high'])}"
-        reached = f"{number(f['value'])} {f['unit']}"
-        table.add_row(*(f[field] for field in where), f["measure"], f["bar"] or "", reached, noise, met, f["note"])
+        had = f["value"] is not None
+        noise = f"{number(f['low'])} … {number(f['high'])}" if had else ""
+        reached = f"{number(f['value'])} {f['unit']}" if had else "—"
+        paper = () if not printed else ("" if f["published"] is None else number(f["published"]),)
+        place = (f[field] for field in where)
+        table.add_row(*place, f["measure"], *paper, f["bar"] or "", reached, noise, met, f["note"])
     return table
 
 
@@ -124,3 +136,10 @@ def _times(results: Results) -> Any:
     for key, row in rows.items():
         table.add_row(*key, *row)
     return table
+
+
+def plot(folder: Path, results: Results) -> list[Path]:
+    """Draw charts of the papers' tables; see papers_plots.plot."""
+    from .papers_plots import plot as draw
+
+    return draw(folder, results)

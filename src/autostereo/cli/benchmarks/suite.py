@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +13,8 @@ from ...errors import InputError
 from .harness import Figure
 
 Say = Callable[[str], object]
+Results = list[dict[str, Any]]
+Keep = Callable[[Results], object]  # is given all figures so far, whenever there are more
 
 
 @dataclass(frozen=True)
@@ -33,6 +37,8 @@ class BenchOptions:
         Name of the engine that is measured.
     shrink : int
         By how much lengths of pictures and volumes are divided if quick.
+    budget : float, optional
+        Seconds after which no work is begun any more; None: all are done.
     """
 
     quick: bool = False
@@ -42,12 +48,15 @@ class BenchOptions:
     specular: float = 0.0
     engine: str = "cpu"
     shrink: int = 4
+    budget: float | None = None
 
     def __post_init__(self) -> None:
         if self.repeats is not None and self.repeats < 1:
             raise InputError(f"bench repeats: expected a whole number ≥ 1, got {self.repeats}")
         if self.shrink < 1:
             raise InputError(f"bench shrink: expected a whole number ≥ 1, got {self.shrink}")
+        if self.budget is not None and not self.budget > 0:
+            raise InputError(f"bench budget: expected seconds > 0, got {self.budget:g}")
         if self.specular < 0:
             raise InputError(f"bench specular: expected a number ≥ 0, got {self.specular:g}")
 
@@ -76,28 +85,37 @@ class Work(Generic[S]):
 
 
 def run_works(
-    works: Mapping[str, Work[S]], studio: S, options: BenchOptions, say: Say, without: tuple[str, ...] = ()
-) -> list[dict[str, Any]]:
-    """Measure the chosen works, but for the scenes in `without`.
+    works: Mapping[str, Work[S]],
+    studio: S,
+    options: BenchOptions,
+    say: Say,
+    without: tuple[str, ...] = (),
+    keep: Keep = lambda results: None,
+) -> Results:
+    """Measure the chosen works, but for the scenes in `without`, until the budget is spent.
 
     Returns
     -------
     list of dict
         The fields of `harness.Figure`: work, scene, lighting, measure, value with its noise band low … high, unit,
-        bar, met (None where nothing is asked, or if quick), times by contender in seconds, note.
+        bar, met (None where nothing is asked, or if quick), times by contender in seconds, note, published.
     """
-    figures: list[Figure] = []
+    results: Results = []
+    end = math.inf if options.budget is None else time.monotonic() + options.budget
     for chosen in options.only or tuple(works):
         work = works[chosen]
         for scene in work.scenes:
             if scene in without:
                 continue
             for lighting in work.lightings:
-                say(" · ".join(word for word in (work.title, scene, lighting and f"lit per {lighting}") if word))
-                figures += work.figures(studio, scene, lighting)
-    results = [figure.as_dict() for figure in figures]
-    if options.quick:
-        results = [figure | {"met": None} for figure in results]
+                title = " · ".join(word for word in (work.title, scene, lighting and f"lit per {lighting}") if word)
+                if time.monotonic() >= end:
+                    say(f"left out, the budget of {options.budget:g} s is spent: {title}")
+                    continue
+                say(title)
+                found = [figure.as_dict() for figure in work.figures(studio, scene, lighting)]
+                results += [figure | {"met": None} for figure in found] if options.quick else found
+                keep(results)
     return results
 
 

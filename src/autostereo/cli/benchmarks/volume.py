@@ -15,7 +15,7 @@ from ...scene.scene import Scene
 from . import workloads
 from .contenders import NPASS, OURS, VTK, Studio, coverage, peer
 from .harness import Bar, Contender, Figure, Measured, cores, machine_facts, measure, unlike
-from .suite import BenchOptions, Say, Work, check_works, run_works
+from .suite import BenchOptions, Keep, Results, Say, Work, check_works, run_works
 from .workloads import Size
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def few(rig: Rig) -> Rig:
     return rig.with_views(min(TIMED_VIEWS, rig.views))
 
 
-def run(options: BenchOptions | None = None, say: Say = print) -> list[dict[str, Any]]:
+def run(options: BenchOptions | None = None, say: Say = print, keep: Keep = lambda results: None) -> Results:
     """Measure every work of `options` and return its figures; see `mesh.run`.
 
     Raises
@@ -90,7 +90,7 @@ def run(options: BenchOptions | None = None, say: Say = print) -> list[dict[str,
     """
     options = options or BenchOptions()
     check_works("volume", WORKS, options.only)
-    return run_works(WORKS, VolumeStudio(options, say), options, say)
+    return run_works(WORKS, VolumeStudio(options, say), options, say, keep=keep)
 
 
 def facts(options: BenchOptions | None = None) -> dict[str, Any]:

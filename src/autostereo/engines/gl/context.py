@@ -11,6 +11,8 @@ import ctypes
 import os
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import TracebackType
@@ -52,6 +54,8 @@ class Device:
     renderer : str
     uploaded : int
         Bytes of scene data sent to the device so far.
+    reads : bool
+        Whether pictures are read back; see `without_reading`.
     """
 
     ctx: Any
@@ -59,6 +63,7 @@ class Device:
     renderer: str
     limits: Limits
     uploaded: int = 0
+    reads: bool = True
     _lock: Any = field(default_factory=threading.RLock)
     _entered: int = 0
 
@@ -103,6 +108,23 @@ class Device:
                 self.ctx.__exit__(kind, error, trace)
         finally:
             self._lock.release()
+
+    @contextmanager
+    def without_reading(self) -> Iterator[None]:
+        """Leave finished pictures on the device meanwhile, as for a screen: arrays to draw into stay as they are.
+
+        Frames in a row then overlap, and what is timed is drawing; `finish` waits for it.
+        """
+        before, self.reads = self.reads, False
+        try:
+            yield
+        finally:
+            self.reads = before
+
+    def finish(self) -> None:
+        """Wait until all is drawn."""
+        with self:
+            self.ctx.finish()
 
     def require(self, version: int, what: str) -> None:
         """Raise UnsupportedError unless the context has this OpenGL version (430 is 4.3)."""

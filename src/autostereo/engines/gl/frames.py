@@ -112,7 +112,7 @@ def draw_views(job: Job, stages: list[Stage], target: Target) -> None:
     """Draw a stack of views, as many at a time as an atlas may hold."""
     for part in atlases(job):
         _draw_samples(part, stages, target.depth)
-        for tile in range(part.count):
+        for tile in range(part.count if job.device.reads else 0):
             part.atlas.read_color(tile, target.color[part.first + tile])
 
 
@@ -164,8 +164,15 @@ def draw_panel(job: Job, stages: list[Stage], target: Target) -> None:
     panel = job.kept.get("panel", (size, bool(over)), lambda: Panel(job.device, size, bool(over)))
     if job.draw.method == "n-pass-subres":
         _weave_small(job, stages, panel)
+    else:
+        _draw_panel_samples(job, under, over, panel)
+    if job.device.reads:
         panel.read(target.color)
-        return
+
+
+def _draw_panel_samples(job: Job, under: list[Stage], over: list[Stage], panel: Panel) -> None:
+    """Fill a panel with the mean colours of all samples: what lies `under`, gathered, and what is drawn `over` it."""
+    camera, size = job.draw.camera, panel.size
     samples = sample_positions(job.draw.options.samples)
     mean = job.kept.get("panel mean", size, lambda: Mean(job.device, size)) if samples[1:] else None
     if mean is not None:
@@ -184,7 +191,6 @@ def draw_panel(job: Job, stages: list[Stage], target: Target) -> None:
             mean.add(job, panel.color)
     if mean is not None:
         mean.write(job, panel.target)
-    panel.read(target.color)
 
 
 def positioned(job: Job, sample: tuple[float, float]) -> Job:

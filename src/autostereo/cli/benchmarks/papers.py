@@ -1,0 +1,63 @@
+"""``autostereo bench papers``: the papers' tables, measured here, beside the figures that they print."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from . import papers_mesh, papers_plane, papers_volume
+from .harness import machine_facts
+from .papers_published import ILLUMINATION_2008, PASSES_2008, SOURCES, VIEWS_2008, VOLUMES_512
+from .papers_studio import PapersStudio
+from .suite import BenchOptions, Keep, Results, Say, Work, check_works, run_works
+
+
+def run(options: BenchOptions | None = None, say: Say = print, keep: Keep = lambda results: None) -> Results:
+    """Measure every work of `options` and return its figures; see `mesh.run`.
+
+    Raises
+    ------
+    InputError
+        A name in `only` is no work.
+    """
+    options = options or BenchOptions()
+    check_works("papers", WORKS, options.only)
+    return run_works(WORKS, PapersStudio(options, say), options, say, keep=keep)
+
+
+def facts(options: BenchOptions | None = None) -> dict[str, Any]:
+    """Facts about this machine that the figures depend on, the gl engine's device among them."""
+    device = PapersStudio(options or BenchOptions(), print).device
+    known = None if device is None else {"renderer": device.renderer, "hardware": device.is_hardware}
+    return machine_facts() | {"device": known, "sources": SOURCES}
+
+
+VOLUMES = tuple(VOLUMES_512)
+WORKS: dict[str, Work[PapersStudio]] = {
+    "2007a-table1": Work("2007a Table 1: volumes, 512×512, 8 views", papers_volume.table_512, VOLUMES),
+    "2008-table1": Work("2008 Table 1: views of 240×180", papers_mesh.table_views, tuple(VIEWS_2008)),
+    "2020-fig15": Work(
+        "2020 Fig. 15: rate by views of one panel",
+        papers_plane.rates_by_views,
+        tuple(f"{views} views" for views in (2, 8, 16, 48, 96)),
+    ),
+    "2007b-points": Work("2007b Chart 2: points", papers_mesh.chart_points, tuple(papers_mesh.POINTS)),
+    "2007b-triangles": Work("2007b Chart 3: triangles", papers_mesh.chart_triangles, tuple(papers_mesh.SUBDIVISIONS)),
+    "2007b-immediate": Work("2007b Chart 4: immediate mode", papers_mesh.chart_immediate),
+    "2007a-chart2": Work("2007a Chart 2: stereo", papers_volume.chart_stereo, VOLUMES),
+    "2020-headline": Work("2020: 96 views, a million vertices", papers_plane.headline, ("1M vertices",)),
+    "2008-table3": Work("2008 Table 3: passes", papers_mesh.table_passes, tuple(PASSES_2008)),
+    "2008-table2": Work("2008 Table 2: illumination", papers_mesh.table_illumination, tuple(ILLUMINATION_2008)),
+    "2008-vertices": Work("8 views of 60×45, many vertices", papers_mesh.vertex_heavy, ("1.3M triangles",)),
+    "2020-fig14": Work(
+        "2020 Fig. 14: stages",
+        papers_plane.stage_times,
+        ("512×384, 16 views", "1024×768, 16 views", "1024×768, 48 views"),
+    ),
+    "2020-multiplications": Work(
+        "2020 section 3: multiplications", papers_plane.multiplications, ("1 view", "8 views", "48 views")
+    ),
+    "uploads": Work("what a frame sends", papers_plane.uploads, ("volume", "points", "mesh")),
+    "alpha": Work("what approximations lose", papers_volume.alpha, VOLUMES[:3]),
+    "focal-plane": Work("distance of the focal plane", papers_volume.focal_plane, ("8 views",)),
+    "2007a-table2": Work("2007a Table 2: volumes, 1900×1200, 8 views", papers_volume.table_1900, VOLUMES),
+}

@@ -1,0 +1,134 @@
+"""The plane rasteriser as the paper of 2020 measured it; and what a frame sends to the device."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from dataclasses import replace
+
+import numpy as np
+
+from ...display.display import Display
+from ...scene.scene import Scene
+from ...scene.shapes import uv_sphere
+from . import workloads
+from .harness import Bar, Figure
+from .papers_mesh import sphere
+from .papers_published import FASTER_FROM_2020, HEADLINE_2020, MULTIPLICATIONS_2020
+from .papers_studio import PapersStudio, Way, on_cpu
+
+ONE, N_TIMES = "plane-rasterizer", "plane-rasterizer-n-pass"
+PANEL = (1024, 768)
+ATTRIBUTES = 9
+SENT = Bar(0, at_least=False)
+
+
+def panel(size: workloads.Size, views: int) -> Display:
+    """A slanted panel of that many views, with the lens of an 8K template."""
+    return workloads.panel_8k_display(size).with_views(views)
+
+
+def stage_times(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
+    """2020, Fig. 14: what the stages take, at two resolutions and two numbers of views."""
+    from ...engines.gl.plane_rasterizer import stage_times as clock
+
+    width, height, views = (int(word) for word in name.replace("×", " ").replace(",", "").split()[:3])
+    scene, size = Scene((sphere(studio, 6),)), studio.size(width, height)
+    way = Way(ONE, panel(size, views), workloads.rig_for(scene, views, size), ONE)
+    picture, reason = studio.picture_or_why(scene, way)
+    if picture is None:
+        return [Figure("2020-fig14", "all stages", *(math.nan,) * 3, "ms", name, note=reason)]
+    rounds = []
+    for _ in range(1 if studio.options.quick else 3):
+        with clock() as spent:
+            studio.picture_or_why(scene, way)
+        rounds.append(spent)
+    note = "each stage waits for the one before; the paper's chart has no printed values"
+    found = []
+    for stage in rounds[0]:
+        values = [1e3 * spent[stage] for spent in rounds]
+        middle = statistics.median(values)
+        found.append(Figure("2020-fig14", stage, middle, min(values), max(values), "ms", name, note=note))
+    return found
+
+
+def rates_by_views(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
+    """2020, Fig. 15: frame rate against the number of views of one panel; the same pipeline a view at a time."""
+    work, views = "2020-fig15", int(name.split()[0])
+    scene, size = Scene((sphere(studio, 6),)), studio.size(*PANEL)
+    rig, display = workloads.rig_for(scene, views, size), panel(size, views)
+    ways = [Way(ONE, display, rig, ONE), Way("single-pass by triangles", display, rig), on_cpu(Way("", display, rig))]
+    if views == 8:
+        ways.append(Way("dibr", display, rig, "dibr"))
+    left_out = views > 48 and studio.too_slow(work)
+    if not left_out:
+        ways.append(Way(N_TIMES, display, rig, N_TIMES))
+    row = studio.row(work, name, scene, ways)
+    if left_out:
+        row.refused[N_TIMES] = f"left out without a GPU; --only {work} measures it"
+    bar = None if left_out or views < 8 else Bar(3.0) if views >= 48 else Bar(1.0)
+    note = f"same pipeline, view by view; the paper: ahead above {FASTER_FROM_2020} views"
+    return [*row.rates(), row.ratio(N_TIMES, ONE, bar, note)]
+
+
+def headline(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
+    """2020: a panel of 7680×4320 with 96 views of a scene of about a million vertices."""
+    work = "2020-headline"
+    scaled = studio.too_slow(work)
+    size = studio.size(7680 // (4 if scaled else 1), 4320 // (4 if scaled else 1))
+    side = 16 if studio.options.quick else 1024
+    scene = Scene((uv_sphere(side, side),))
+    rig, display = workloads.rig_for(scene, 96, size), panel(size, 96)
+    ways = [Way(ONE, display, rig, ONE), Way("single-pass by triangles", display, rig), on_cpu(Way("", display, rig))]
+    published = {} if scaled else {ONE: HEADLINE_2020}
+    row = studio.row(work, name, scene, ways, published)
+    note = f"panel {size[0]}×{size[1]}, {len(scene.objects[0].vertices)} vertices"  # type: ignore[union-attr]
+    note += f"; 1/16 of the pixels without a GPU, --only {work} for all" if scaled else "; the paper: more than"
+    return [figure_with(figure, note) for figure in row.rates()]
+
+
+def figure_with(figure: Figure, note: str) -> Figure:
+    """The figure with one more note."""
+    return replace(figure, note="; ".join(word for word in (figure.note, note) if word))
+
+
+def multiplications(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
+    """2020, section 3: multiplications a sample, counted while the formulas run."""
+    from ...engines.gl.plane_counts import multiplications as count
+
+    views = int(name.split()[0])
+    triangle = ((-0.1, -0.1, 2.0), (0.1, -0.08, 2.1), (0.0, 0.12, 1.9))
+    offsets = np.linspace(-0.3, 0.3, views) if views > 1 else np.zeros(1)
+    many, one, covered = count(triangle, offsets.tolist(), (200.0, 200.0, 0.5), ATTRIBUTES)
+    alone, each, shared = MULTIPLICATIONS_2020
+    note = f"{covered / views:.0f} samples a view, {ATTRIBUTES} attributes; every sample is evaluated, not stepped to"
+    values = {"view by view": (many / covered, alone), "in one pass": (one / covered, each + shared / views)}
+    return [
+        Figure("2020-multiplications", called, value, value, value, "a sample", name, note=note, published=paper)
+        for called, (value, paper) in values.items()
+    ]
+
+
+def uploads(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
+    """Bytes of scene data that frames after the first send to the device."""
+    from ...scene.samples import shells
+
+    make = {
+        "volume": lambda: Scene((shells(16),)),
+        "points": lambda: workloads.surfel_scene(1000),
+        "mesh": lambda: Scene((sphere(studio, 3),)),
+    }
+    scene, size = make[name](), (64, 64)
+    found = []
+    for method in ("single-pass", "n-pass", *((ONE,) if name == "mesh" else ())):
+        way = Way(method, Display.wavelength_selective(*size), workloads.rig_for(scene, 8, size), method)
+        picture, reason = studio.picture_or_why(scene, way)
+        device, value = studio.device, math.nan
+        if picture is not None and device is not None:
+            before = device.uploaded
+            for _ in range(3):
+                way.draw(studio.renderer(scene, "gl"))
+            value = float(device.uploaded - before)
+        called = f"{method}: sent by three more frames"
+        found.append(Figure("uploads", called, value, value, value, "bytes", name, bar=SENT, note=reason))
+    return found

@@ -1,0 +1,178 @@
+"""Volumes as Hübner and Pajarola 2007a measured them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+from ...display.display import Display
+from ...engines.options import Options
+from ...io import load
+from ...scene import samples
+from ...scene.scene import Scene
+from ...scene.volume import Volume
+from . import workloads
+from .harness import Bar, Figure
+from .papers_published import (
+    BUCKY,
+    CHART_CLAIMS,
+    ENGINE,
+    GPU_MV,
+    HYDROGEN,
+    MV,
+    NEGHIP,
+    SKULL,
+    SUBRES,
+    SUBRES_512,
+    SV,
+    VOLUMES_512,
+    VOLUMES_1900,
+)
+from .papers_studio import CPU, PapersStudio, Way, noted, on_cpu
+from .volume import psnr
+
+DATA: dict[str, tuple[str, int, Callable[[int], Volume]]] = {  # file in DIR/volumes, voxels a side, stand-in
+    BUCKY: ("Bucky.raw", 32, samples.c60_density),
+    NEGHIP: ("neghip.json", 64, samples.shells),
+    HYDROGEN: ("hydrogen.vti", 128, samples.hydrogen_orbital),
+    ENGINE: ("engine.nii.gz", 256, samples.engine_part),
+    SKULL: ("bonsai.nii.gz", 256, samples.shells),
+}
+LENTICULAR, MV_LENTICULAR, SLICES = "GPU-MV lenticular", "MV lenticular", "GPU-MV by slices"
+OWN = Options(volume="exact")  # no ray takes what another has looked up
+EXACT = "GPU-MV, own lookups"
+FOCI = (0.5, 0.75, 1.5, 3.0)  # of the distance to the object
+SHARED = Bar(2.5)  # three views a pixel, from 64³ on
+ONE_VIEW = Bar(6.0)
+STEREO = Bar(1.8)
+
+
+def volume_scene(studio: PapersStudio, name: str) -> tuple[Scene, str]:
+    """A data set of the paper, from the data folder if it is there, and in words which data it is."""
+    file, side, stand_in = DATA[name]
+    folder = studio.options.data
+    if folder is not None and not studio.options.quick:
+        path = folder / "volumes" / file
+        if path.is_file() and path.suffix != ".raw":
+            scene = load(path)
+            return scene, f"data: {path.name}"
+    voxels = max(32, side // studio.options.divisor)
+    return Scene((stand_in(voxels),)), f"data: stand-in {stand_in.__name__}({voxels})"
+
+
+def table_512(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
+    """2007a, Table 1: 8 views at 512×512; also for a lenticular sheet, one view a pixel."""
+    work = "2007a-table1"
+    scene, data = volume_scene(studio, name)
+    size = studio.size(512, 512)
+    rig = workloads.rig_for(scene, 8, size)
+    filters, lenses = Display.wavelength_selective(*size), Display.lenticular(*size, 8)
+    ways = [
+        Way(SV, size, rig.with_views(1), "n-pass"),
+        Way(MV, filters, rig, "n-pass"),
+        Way(GPU_MV, filters, rig),
+        Way(LENTICULAR, lenses, rig),
+        Way(EXACT, filters, rig, options=OWN),
+        on_cpu(Way("", filters, rig), f"{GPU_MV} on {CPU}"),
+    ]
+    if name in (BUCKY, NEGHIP) or not studio.too_slow(work):
+        ways += [Way(MV_LENTICULAR, lenses, rig, "n-pass"), Way(SLICES, filters, rig, options=Options(proxy="slices"))]
+    if name in SUBRES_512:
+        ways.append(Way(SUBRES, filters, rig, "n-pass-subres"))
+    row = studio.row(work, name, scene, ways, VOLUMES_512[name] | SUBRES_512.get(name, {}))
+    found = noted(row.rates(), data)
+    found.append(row.ratio(MV, GPU_MV, None if name == BUCKY else SHARED, "three views a pixel, lookups shared"))
+    found.append(row.ratio(MV, EXACT, note="three views a pixel, nothing approximated; lit for each eye, unlike MV"))
+    base = MV_LENTICULAR if any(way.name == MV_LENTICULAR for way in ways) else MV
+    note = "one view a pixel" + ("" if base == MV_LENTICULAR else "; MV costs the same by every mask")
+    found.append(row.ratio(base, LENTICULAR, ONE_VIEW, note))
+    return [*found, row.percent(MV, SV), row.percent(GPU_MV, SV)]
+
+
+def table_1900(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
+    """2007a, Table 2: 8 views at 1900×1200, with small views scaled up."""
+    work = "2007a-table2"
+    if name != BUCKY and studio.too_slow(work):
+        studio.say(f"left out without a GPU: {work}, {name}; --only {work} measures it")
+        return []
+    scene, data = volume_scene(studio, name)
+    size = studio.size(1900, 1200)
+    rig, filters = workloads.rig_for(scene, 8, size), Display.wavelength_selective(*size)
+    ways = [
+        Way(SV, size, rig.with_views(1), "n-pass"),
+        Way(MV, filters, rig, "n-pass"),
+        Way(SUBRES, filters, rig, "n-pass-subres"),
+        Way(GPU_MV, filters, rig),
+        on_cpu(Way("", filters, rig), f"{GPU_MV} on {CPU}"),
+    ]
+    row = studio.row(work, name, scene, ways, VOLUMES_1900[name])
+    found = noted(row.rates(), data)
+    found += [row.ratio(MV, GPU_MV), row.ratio(SUBRES, GPU_MV)]
+    return [*found, row.percent(MV, SV), row.percent(GPU_MV, SV)]
+
+
+def chart_stereo(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
+    """2007a, Chart 2: two views at 512×512 in per cent of the single view, with early z of 1, 2, 4 pixels a view."""
+    work = "2007a-chart2"
+    if name in (ENGINE, SKULL) and studio.too_slow(work):
+        studio.say(f"left out without a GPU: {work}, {name}; --only {work} measures it")
+        return []
+    scene, data = volume_scene(studio, name)
+    size = studio.size(512, 512)
+    rig = workloads.rig_for(scene, 2, size)
+    columns = {pixels: striped(size, pixels) for pixels in (1, 2, 4)}
+    early = {f"early z, {pixels} pixels a view": display for pixels, display in columns.items()}
+    ways = [
+        Way(SV, size, rig.with_views(1), "n-pass"),
+        Way("2 MV", columns[1], rig, "n-pass"),
+        Way(GPU_MV, columns[1], rig),
+        *(Way(called, display, rig, "n-pass-masked") for called, display in early.items()),
+        on_cpu(Way("", columns[1], rig), f"{GPU_MV} on {CPU}"),
+    ]
+    row = studio.row(work, name, scene, ways)
+    claims = {"2 MV": CHART_CLAIMS["stereo"][MV]}
+    shares = [row.percent(way.name, SV, claims.get(way.name)) for way in ways[1:]]
+    return [*noted(row.rates(), data), row.ratio("2 MV", GPU_MV, STEREO, "stereo"), *shares]
+
+
+def striped(size: workloads.Size, pixels: int) -> Display:
+    """A stereo panel whose views alternate every so many columns of pixels."""
+    return Display.from_table(*size, 2, [[[view] * 3 for view in (0, 1) for _ in range(pixels)]])
+
+
+def focal_plane(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
+    """2007a/b: the cost of the focal plane's distance from the object, in a single pass."""
+    scene, data = volume_scene(studio, NEGHIP)
+    size = studio.size(512, 512)
+    rig, filters = workloads.rig_for(scene, 8, size), Display.wavelength_selective(*size)
+    ways = [Way("in focus", filters, rig)]
+    ways += [Way(f"focus at {f:g} of the distance", filters, replace(rig, focal_distance=f * rig.focal)) for f in FOCI]
+    row = studio.row("focal-plane", name, scene, ways)
+    slower = [row.ratio(way.name, "in focus", note="times the time") for way in ways[1:]]
+    return [*noted(row.rates(), data), *slower]
+
+
+def alpha(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
+    """2007a, Fig. 6, and its one opacity for three views: what they lose, against each view's own rays.
+
+    Each approximation by itself: sharing lookups between the rays of a pixel is the default of the single pass.
+    """
+    scene, data = volume_scene(studio, name)
+    size = studio.size(512, 512)
+    rig, filters = workloads.rig_for(scene, 8, size), Display.wavelength_selective(*size)
+    averaged = replace(OWN, alpha="averaged")
+    pairs = [
+        (Way("exact opacity", filters, rig, options=OWN), OWN),
+        (Way("averaged opacity", filters, rig, options=averaged), OWN),
+        (Way(SUBRES, filters, rig, "n-pass-subres", options=OWN), OWN),
+        (Way("shared lookups", filters, rig), Options()),
+    ]
+    found = []
+    for way, options in pairs:
+        picture, reason = studio.picture_or_why(scene, Way("", filters, rig, "n-pass", options=options))
+        other, why = studio.picture_or_why(scene, way)
+        value = math.nan if picture is None or other is None else psnr(other, picture)
+        note = reason or why or data
+        found.append(Figure("alpha", f"PSNR of {way.name}", value, value, value, "dB", name, note=note))
+    return found

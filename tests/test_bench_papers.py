@@ -1,0 +1,255 @@
+"""``bench papers`` measures every table of the papers, and prints what they print beside it."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from autostereo.cli.benchmarks import harness, papers, papers_published, papers_studio, report, suite, workloads
+from autostereo.cli.benchmarks.papers_studio import PapersStudio, Way
+from autostereo.cli.benchmarks.suite import BenchOptions, Work
+from autostereo.display.display import Display
+from autostereo.errors import DependencyError, InputError
+from autostereo.render import Renderer
+from autostereo.scene.scene import Scene
+from autostereo.scene.shapes import icosphere
+from gl_device import need_device
+
+SIZE = (48, 32)
+
+
+def quick(*only, **changes):
+    return BenchOptions(quick=True, repeats=1, shrink=32, only=only, **changes)
+
+
+def silent(line):
+    pass
+
+
+# --- what the papers print -------------------------------------------------------------------------------------------
+
+
+def test_published_figures_are_those_of_the_papers():
+    def printed(table):
+        return " · ".join("/".join(f"{value:g}" for value in row.values()) for row in table.values())
+
+    p = papers_published
+    assert printed(p.VOLUMES_512) == "463/51/128 · 241/29/57 · 89/10/26 · 15/1.9/8.3 · 15/1.8/7.8"
+    large = "116/12.8/39/26.6 · 58.8/6.8/25.6/11.9 · 24.8/3.3/10.5/5.5 · 6.4/0.9/1.9/2.1 · 5.9/0.8/1.8/2"
+    assert printed(p.VOLUMES_1900) == large
+    assert printed(p.SUBRES_512) == "8.3/1.9/3"
+    assert printed(p.VIEWS_2008) == "157/157 · 80/141 · 38/70 · 19/24"
+    assert printed(p.ILLUMINATION_2008) == "326/326/160/160 · 168/167/83/83 · 80/80/28/28 · 60/60/24/23"
+    assert printed(p.PASSES_2008) == "14/15/23/21/14"
+    assert p.HEADLINE_2020 == 60 and p.FASTER_FROM_2020 == 10 and p.MULTIPLICATIONS_2020 == (38, 8, 30)
+    assert {work.split("-")[0] for work in papers.WORKS} >= set(p.SOURCES)
+
+
+# --- every table -----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    need_device()
+    folder, lines = tmp_path_factory.mktemp("papers"), []
+    path = folder / "papers.json"
+    results = report.bench("papers", quick(), path, lines.append)
+    charts = report.plot(folder / "charts", results)
+    return SimpleNamespace(results=results, saved=json.loads(path.read_text()), lines=lines, charts=charts)
+
+
+def found(measured, work, scene, measure):
+    (figure,) = [f for f in measured.results if (f["work"], f["scene"], f["measure"]) == (work, scene, measure)]
+    return figure
+
+
+@pytest.mark.parametrize("work", papers.WORKS)
+def test_every_work_has_figures_of_every_scene(measured, work):
+    figures = [f for f in measured.results if f["work"] == work]
+    assert {f["scene"] for f in figures} == set(papers.WORKS[work].scenes)
+    for f in figures:
+        if f["value"] is None:
+            assert f["note"].startswith("not available: "), f
+        else:
+            assert math.isfinite(f["value"]) and f["low"] <= f["value"] <= f["high"], f
+            assert f["value"] > 0 or f["unit"] == "bytes" or f["unit"] == "ms", f
+
+
+def test_nothing_failed_and_only_what_the_engine_lacks_is_not_available(measured):
+    refused = {(f["work"], f["measure"]) for f in measured.results if f["value"] is None}
+    immediate = {("2007b-immediate", "MV of SV"), ("2007b-immediate", "GPU-MV of SV")}
+    assert refused == {("2020-fig15", "dibr"), *immediate}
+
+
+def test_ours_stands_beside_what_is_printed(measured):
+    assert found(measured, "2007a-table1", "Engine 256³", "GPU-MV")["published"] == 8.3
+    assert found(measured, "2007a-table1", "Engine 256³", "MV sub-res")["published"] == 3
+    assert found(measured, "2007a-table1", "Engine 256³", "MV / GPU-MV")["published"] == pytest.approx(8.3 / 1.9)
+    assert found(measured, "2007a-table2", "Skull 256³", "MV sub-res")["published"] == 1.8
+    assert found(measured, "2007a-table2", "Skull 256³", "MV of SV")["published"] == pytest.approx(100 * 0.8 / 5.9)
+    assert found(measured, "2007b-points", "1M surfels", "GPU-MV of SV")["published"] == pytest.approx(100 / 3)
+    assert found(measured, "2008-table1", "4 views", "geometry-shader")["published"] == 70
+    assert found(measured, "2008-table2", "8 views", "geometry-shader, per pixel")["published"] == 23
+    assert found(measured, "2008-table3", "12 views", "4 passes")["published"] == 23
+    assert found(measured, "2008-table3", "12 views", "1 pass")["published"] is None
+    assert found(measured, "2020-headline", "1M vertices", "plane-rasterizer")["published"] == 60
+    assert found(measured, "2020-multiplications", "8 views", "in one pass")["published"] == 8 + 30 / 8
+
+
+def test_ratios_and_shares_are_those_of_the_rates(measured):
+    scene = "Neghip 64³"
+    rate = {name: found(measured, "2007a-table1", scene, name)["value"] for name in ("SV", "MV", "GPU-MV")}
+    ratio = found(measured, "2007a-table1", scene, "MV / GPU-MV")
+    assert ratio["value"] == pytest.approx(rate["GPU-MV"] / rate["MV"])
+    assert found(measured, "2007a-table1", scene, "MV of SV")["value"] == pytest.approx(100 * rate["MV"] / rate["SV"])
+    assert ratio["bar"] == "≥ 2.5" and ratio["met"] is None  # quick: held to no bar
+
+
+def test_what_approximations_lose_is_told_apart(measured):
+    for scene in papers.WORKS["alpha"].scenes:
+        lost = {f["measure"]: f["value"] for f in measured.results if (f["work"], f["scene"]) == ("alpha", scene)}
+        assert lost.pop("PSNR of exact opacity") > 60  # the same rays in one pass
+        assert set(lost) == {f"PSNR of {name}" for name in ("averaged opacity", "MV sub-res", "shared lookups")}
+        assert all(value < 60 for value in lost.values()), (scene, lost)
+
+
+def test_a_frame_after_the_first_sends_no_scene_data(measured):
+    sent = [f for f in measured.results if f["work"] == "uploads"]
+    assert len(sent) == 7 and {f["value"] for f in sent} == {0.0}
+
+
+def test_the_report_names_the_device_and_json_holds_all(measured):
+    assert measured.saved["figures"] == measured.results
+    device = need_device()
+    facts = measured.saved["machine"]
+    assert facts["device"] == {"renderer": device.renderer, "hardware": device.is_hardware}
+    assert any(line.startswith(f"OpenGL: {device.renderer}, ") for line in report.describe(facts))
+
+
+def test_charts_are_pictures(measured):
+    names = {path.name for path in measured.charts}
+    assert {"2007a-table1-fps.png", "2007a-chart2-percent.png", "2008-table3-fps.png", "2020-fig15-fps.png"} <= names
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in measured.charts)
+
+
+# --- what goes wrong -------------------------------------------------------------------------------------------------
+
+
+def test_without_a_device_everything_is_reported_as_not_available(monkeypatch, capsys):
+    door = sys.modules["autostereo.render"]
+    get_engine = door.get_engine
+
+    def missing(name, scene=None):
+        if name == "gl":
+            raise DependencyError("engine gl gets no OpenGL context")
+        return get_engine(name, scene)
+
+    monkeypatch.setattr(door, "get_engine", missing)
+    monkeypatch.setattr(PapersStudio, "device", None)
+    results = report.bench("papers", quick("2008-table3"), None, silent)
+    refused = [f for f in results if f["value"] is None]
+    assert {f["note"] for f in refused} == {"not available: engine gl gets no OpenGL context"}
+    assert [f["measure"] for f in results if f["value"] is not None] == ["cpu engine"]
+    assert "OpenGL: none" in capsys.readouterr().out
+
+
+def test_what_a_driver_refuses_costs_one_figure():
+    class Broken:
+        def render_views(self, *arguments, **named):
+            raise RuntimeError("out of nothing\nmore")
+
+    studio, scene = PapersStudio(quick(), silent), Scene((icosphere(1),))
+    studio._scene, studio._renderers = scene, {"broken": Broken()}
+    rig = workloads.rig_for(scene, 2, SIZE)
+    row = studio.row("w", "s", scene, [Way("a", SIZE, rig, engine="broken"), Way("b", SIZE, rig, engine="cpu")])
+    assert row.refused == {"a": "failed: RuntimeError: out of nothing"} and list(row.times) == ["b"]
+    figure = row.ratio("a", "b", harness.Bar(1)).as_dict()
+    assert figure["value"] is None and figure["met"] is False and figure["note"] == row.refused["a"]
+
+
+def test_an_engine_that_draws_nothing_is_not_timed(monkeypatch):
+    studio, scene = PapersStudio(quick(), silent), Scene((icosphere(1),))
+    rig = workloads.rig_for(scene, 2, SIZE)
+    monkeypatch.setattr(Way, "draw", lambda self, renderer, out=None: np.full((2, 4, 4, 4), 7, np.uint8))
+    row = studio.row("w", "s", scene, [Way("a", SIZE, rig, engine="cpu")])
+    assert not row.times and "draws nothing" in row.refused["a"]
+
+
+def test_what_is_measured_is_kept_when_a_later_work_fails(monkeypatch, tmp_path):
+    def fail(studio, scene, lighting):
+        raise RuntimeError("no")
+
+    one = harness.Figure("good", "a", 1.0, 1.0, 1.0)
+    works = {"good": Work("good", lambda *_: [one]), "bad": Work("bad", fail)}
+    monkeypatch.setattr(papers, "WORKS", works)
+    with pytest.raises(RuntimeError):
+        report.bench("papers", quick(), tmp_path / "p.json", silent)
+    assert [f["work"] for f in json.loads((tmp_path / "p.json").read_text())["figures"]] == ["good"]
+
+
+def test_no_work_begins_after_the_budget(monkeypatch):
+    now = SimpleNamespace(seconds=0.0)
+    monkeypatch.setattr(suite, "time", SimpleNamespace(monotonic=lambda: now.seconds))
+
+    def spend(studio, scene, lighting):
+        now.seconds += 10
+        return [harness.Figure(scene, "a", 1.0, 1.0, 1.0)]
+
+    lines = []
+    works = {"w": Work("work", spend, ("x", "y", "z"))}
+    results = suite.run_works(works, None, BenchOptions(budget=15), lines.append)
+    assert [f["work"] for f in results] == ["x", "y"]
+    assert lines == ["work · x", "work · y", "left out, the budget of 15 s is spent: work · z"]
+    with pytest.raises(InputError, match="budget"):
+        BenchOptions(budget=0)
+
+
+def test_unknown_works_are_named():
+    with pytest.raises(InputError, match="bench papers: there is no work 'nix'; there are 2007a-table1, "):
+        papers.run(quick("nix"), silent)
+
+
+# --- timing ----------------------------------------------------------------------------------------------------------
+
+
+def test_no_round_begins_after_the_limit(monkeypatch):
+    now = SimpleNamespace(seconds=0.0, frames=0)
+    monkeypatch.setattr(harness, "time", SimpleNamespace(perf_counter=lambda: now.seconds))
+
+    def frame():
+        now.seconds += 3
+        now.frames += 1
+
+    contender = harness.Contender("a", frame, scale=2.0)
+    times = harness.measure([contender], 5, least=2, limit=10, warm=True)["a"]
+    assert (times.seconds, times.frames) == ((6.0, 6.0), 2)
+    assert now.frames == 5  # one to find how many frames, two rounds: the second begins after 9 s, no third after 15
+    assert harness.measure([contender], 5, limit=2, warm=True)["a"].seconds == (6.0,)
+    assert now.frames == 7  # one round there always is
+
+
+def test_pictures_stay_on_the_device_only_meanwhile():
+    device = need_device()
+    scene = Scene((icosphere(2),))
+    rig, renderer = workloads.rig_for(scene, 8, SIZE), Renderer(scene, "gl")
+    panel = Display.wavelength_selective(*SIZE)
+    ways = [Way(m, t, rig, m) for m in ("single-pass", "n-pass") for t in (panel, SIZE)]
+    for way in [*ways, Way("n-pass-subres", panel, rig, "n-pass-subres")]:
+        wanted = way.draw(renderer).copy()
+        assert wanted.max() > 0
+        out = np.full_like(wanted, 9)
+        with device.without_reading():
+            way.draw(renderer, out)
+            device.finish()
+        assert (out == 9).all()
+        assert (way.draw(renderer, out) == wanted).all()
+
+
+def test_cpu_columns_are_drawn_by_the_cpu():
+    way = papers_studio.on_cpu(Way("x", SIZE, workloads.rig_for(Scene((icosphere(1),)), 2, SIZE), "geometry-shader"))
+    assert (way.name, way.engine, way.method) == ("cpu engine", "cpu", "single-pass")
