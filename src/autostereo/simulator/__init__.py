@@ -1,0 +1,1 @@
+"""Multi-view rasterisation hardware, as a functional simulator (Hasselgren and Akenine-Möller 2006)."""
