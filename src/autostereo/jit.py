@@ -41,6 +41,10 @@ class Kernels:
         """
         return self._compile(function, forceinline=True, _nrt=False)
 
+    def lean(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Compile `function` without reference counting, as `inlined`, but as a function that is called."""
+        return self._compile(function, _nrt=False)
+
     def is_compiled(self, *names: str) -> bool:
         """True when the cache holds the kernels whose names begin so: what uses them starts at once."""
         if config.DISABLE_JIT:

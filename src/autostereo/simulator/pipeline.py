@@ -165,7 +165,7 @@ class Pass:
         units = np.array(draw.textures, np.int64)
         work = Work(
             corners, attributes, derivatives, draw.mirrored, number, uniforms, units, blend, float(setting.weight),
-            options.unified_camera, from_buffer,
+            options.unified_camera, from_buffer, np.zeros((3, attributes.shape[2])), np.zeros((5, 4)), np.zeros((3, 3)),
         )  # fmt: skip
         return work, shade
 

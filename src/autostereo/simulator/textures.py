@@ -171,4 +171,4 @@ class TextureStore:
     def memory(self, slots: int, ways: int) -> TextureMemory:
         """The textures behind an empty cache."""
         cache = make_lru(max(self.lines, 1), slots, ways)
-        return TextureMemory(self.texels, self.levels, self.textures, cache, np.zeros(3, np.int64))
+        return TextureMemory(self.texels, self.levels, self.textures, cache, np.zeros(3, np.int64), np.zeros((4, 4)))

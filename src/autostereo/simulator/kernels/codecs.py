@@ -186,7 +186,10 @@ def fold(residual):
 
 @kernel
 def rice_bits(residuals):
-    """Bits of residuals (h, w) in the best Golomb–Rice code, the parameter (four bits; 15: all are zero) included."""
+    """Bits of residuals (h, w) in a Golomb–Rice code, with its parameter k (four bits; 15: all are zero).
+
+    k is the whole part of log2 of the mean, as in LOCO-I.
+    """
     h, w = residuals.shape
     total = np.int64(0)
     for y in range(h):
@@ -194,14 +197,14 @@ def rice_bits(residuals):
             total += fold(residuals[y, x])
     if total == 0:
         return np.int64(4)
-    best = np.int64(1) << 60
-    for k in range(11):
-        bits = np.int64(4 + h * w * (k + 1))
-        for y in range(h):
-            for x in range(w):
-                bits += fold(residuals[y, x]) >> k
-        best = min(best, bits)
-    return best
+    k = 0
+    while (h * w) << (k + 1) <= total:
+        k += 1
+    bits = np.int64(4 + h * w * (k + 1))
+    for y in range(h):
+        for x in range(w):
+            bits += fold(residuals[y, x]) >> k
+    return bits
 
 
 @kernel

@@ -171,7 +171,8 @@ def set_up(corners, facing, view, plan, scratch):
         low, high = min(low, y), max(high, y)
     first = np.int64(max(np.floor(low) - 1.0, 0.0)) if low < view.height + 2 else view.height
     last = np.int64(min(np.ceil(high) + 1.0, view.height - 1.0)) if high > -2 else -1
-    scratch.exact[:] = plan.exact
+    for g in range(len(plan.exact)):
+        scratch.exact[g] = plan.exact[g]
     any_view = False
     for v in range(plan.first, plan.last):
         det = set_edges(view, corners, view.offsets[v], scratch.edges[v])

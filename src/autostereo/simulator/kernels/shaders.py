@@ -90,7 +90,7 @@ def surface(at, dx, dy, eye, uniforms, memory, units, out):
 @kernel
 def level(at, dx, dy, eye, uniforms, memory, units, out):
     """Decal times light map, as games of 2000: two texture units. Attributes uv of both."""
-    light = np.empty(4)
+    light = memory.colors[0]
     _filtered(memory, units[0], at, dx, dy, 0, out)
     _filtered(memory, units[1], at, dx, dy, 2, light)
     for c in range(3):
@@ -106,8 +106,7 @@ def shadows(at, dx, dy, eye, uniforms, memory, units, out):
     gloss, shadow map. uniforms: unit vector to the light, radius of the penumbra in the map, bias. 8 samples on the rim;
     only where they disagree 56 more, so penumbras alone are dear. Four texels a sample.
     """
-    bump = np.empty(4)
-    gloss = np.empty(4)
+    bump, gloss = memory.colors[0], memory.colors[1]
     _filtered(memory, units[0], at, dx, dy, 0, out)
     _filtered(memory, units[1], at, dx, dy, 0, bump)
     _filtered(memory, units[2], at, dx, dy, 0, gloss)
@@ -150,9 +149,7 @@ def ocean(at, dx, dy, eye, uniforms, memory, units, out):
     Attributes: place on the water (x, z; world), position (eye space), world height. Units: bump, sky, sea floor, foam.
     uniforms: time, eye height above the water, then world_from_eye rotation (9) and the world x, z of the centre camera.
     """
-    bump = np.empty(4)
-    floor = np.empty(4)
-    foam = np.empty(4)
+    bump, floor, foam = memory.colors[0], memory.colors[1], memory.colors[2]
     sx, sz = 0.0, 0.0
     time = uniforms[0]
     footprint = math.sqrt(max(dx[0] * dx[0] + dx[1] * dx[1], dy[0] * dy[0] + dy[1] * dy[1]))
@@ -209,4 +206,5 @@ def built_in(kind, at, dx, dy, eye, uniforms, memory, units, out):
     elif kind == SURFACE:
         surface(at, dx, dy, eye, uniforms, memory, units, out)
     else:  # PLAIN: the first uniforms
-        out[:] = uniforms[:4]
+        for c in range(4):
+            out[c] = uniforms[c]

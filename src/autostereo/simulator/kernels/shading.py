@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .buffers import enter, mark, need, pixel_bit
-from .compiling import kernel
+from .compiling import inlined, kernel
 from .geometry import evaluate, set_edges
 from .shaders import built_in as shader
 from .textures import MISSES
@@ -38,6 +38,8 @@ class Work(NamedTuple):
         Shade for the centre camera in all views.
     from_buffer : bool
         Approximations take what is in the colour buffer, not what the shader gave.
+    sample : ndarray of shape (3, A); small : (5, 4); edges : (3, 3)
+        Memory to work in.
     """
 
     corners: Any
@@ -51,6 +53,9 @@ class Work(NamedTuple):
     weight: float
     unified: bool
     from_buffer: bool
+    sample: Any
+    small: Any
+    edges: Any
 
 
 class Target(NamedTuple):
@@ -79,7 +84,7 @@ class Target(NamedTuple):
     misses: Any
 
 
-@kernel
+@inlined
 def put(color, v, x, y, blend, weight, target):
     """One fragment into the colour buffer; returns nothing, leaves in color (4,) what the buffer holds then."""
     buffer = target.buffer
@@ -118,9 +123,10 @@ def _shade_fragments(fragments, work, view, memory, target):
     """Shade, or put together from their taps, all fragments of the list, and write them."""
     attributes = work.attributes
     count = attributes.shape[2]
-    at, dx, dy = np.zeros(count), np.zeros(count), np.zeros(count)
-    out, eye, edges = np.zeros(4), np.zeros(4), np.empty((3, 3))
-    weights, wx, wy = np.empty(3), np.empty(3), np.empty(3)
+    at, dx, dy = work.sample[0], work.sample[1], work.sample[2]
+    out, eye = work.small[0], work.small[1]
+    weights, wx, wy = work.small[2], work.small[3], work.small[4]
+    edges = work.edges
     triangle, v = -1, -1
     with_map, with_misses = len(target.how) > 0, len(target.misses) > 0
     for n in range(fragments.cursor[0]):

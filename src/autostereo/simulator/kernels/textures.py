@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .compiling import inlined, kernel
+from .compiling import inlined
 from .lru import HIT, touch
 
 ACCESSES, MISSES, LOOKUPS = range(3)
@@ -32,6 +32,8 @@ class TextureMemory(NamedTuple):
     cache : Lru
     counts : ndarray of shape (3,), int64
         Texels read, cache misses, filtered look-ups.
+    colors : ndarray of shape (4, 4), float64
+        For shaders: where look-ups may put what they find.
     """
 
     texels: Any
@@ -39,18 +41,38 @@ class TextureMemory(NamedTuple):
     textures: Any
     cache: Any
     counts: Any
+    colors: Any
 
 
 @inlined
-def read_texel(memory, level, column, row):
-    """Index of a texel, after its line went through the cache."""
-    shifts = level[5]
-    line = level[3] + (row >> (shifts & 255)) * level[4] + (column >> (shifts >> 8))
-    counts = memory.counts
-    counts[ACCESSES] += 1
+def _use_line(memory, line):
     if touch(memory.cache, line) != HIT:
-        counts[MISSES] += 1
-    return level[0] + row * level[1] + column
+        memory.counts[MISSES] += 1
+
+
+@inlined
+def _use_four(memory, number, x0, x1, r0, r1):
+    """Four texels of a level go through the cache: row by row if both columns lie in one block, else column by column.
+
+    So a line that is used twice in a row is looked up once, which no cache can tell apart from twice.
+    """
+    levels = memory.levels
+    shifts = levels[number, 5]
+    across, down = shifts >> 8, shifts & 255
+    first, pitch = levels[number, 3], levels[number, 4]
+    upper, lower = first + (r0 >> down) * pitch, first + (r1 >> down) * pitch
+    left, right = x0 >> across, x1 >> across
+    memory.counts[ACCESSES] += 4
+    _use_line(memory, upper + left)
+    if left == right:
+        if upper != lower:
+            _use_line(memory, lower + left)
+    elif upper == lower:
+        _use_line(memory, upper + right)
+    else:
+        _use_line(memory, lower + left)
+        _use_line(memory, upper + right)
+        _use_line(memory, lower + right)
 
 
 @inlined
@@ -66,8 +88,7 @@ def _wrap(i, n):
 @inlined
 def add_bilinear(memory, number, u, v, share, out):
     """Add `share` times the bilinear colour of a level at (u, v) to out (4,)."""
-    level = memory.levels[number]
-    w, h = level[1], level[2]
+    w, h = memory.levels[number, 1], memory.levels[number, 2]
     x = (u - math.floor(u)) * w - 0.5
     y = (v - math.floor(v)) * h - 0.5
     left, low = math.floor(x), math.floor(y)
@@ -75,21 +96,20 @@ def add_bilinear(memory, number, u, v, share, out):
     x0, y0 = _wrap(np.int64(left), w), _wrap(np.int64(low), h)
     x1, y1 = _wrap(x0 + 1, w), _wrap(y0 + 1, h)
     r0, r1 = h - 1 - y0, h - 1 - y1
-    a = read_texel(memory, level, x0, r0)
-    b = read_texel(memory, level, x1, r0)
-    c = read_texel(memory, level, x0, r1)
-    d = read_texel(memory, level, x1, r1)
-    texels = memory.texels
+    _use_four(memory, number, x0, x1, r0, r1)
+    texels, start = memory.texels, memory.levels[number, 0]
+    a, b = start + r0 * w + x0, start + r0 * w + x1
+    c, d = start + r1 * w + x0, start + r1 * w + x1
     for k in range(4):
         below = (1.0 - s) * texels[a, k] + s * texels[b, k]
         above = (1.0 - s) * texels[c, k] + s * texels[d, k]
         out[k] += share * ((1.0 - t) * below + t * above)
 
 
-@kernel
+@inlined
 def trilinear(memory, texture, u, v, dudx, dvdx, dudy, dvdy, out):
     """Colour 0…1 into out (4,), trilinearly filtered; the derivatives are those of (u, v) per pixel."""
-    first, count = memory.textures[texture]
+    first, count = memory.textures[texture, 0], memory.textures[texture, 1]
     w, h = memory.levels[first, 1], memory.levels[first, 2]
     rx = (dudx * w) ** 2 + (dvdx * h) ** 2
     ry = (dudy * w) ** 2 + (dvdy * h) ** 2
@@ -100,35 +120,36 @@ def trilinear(memory, texture, u, v, dudx, dvdx, dudy, dvdy, out):
     lower = np.int64(detail)
     fraction = detail - lower
     memory.counts[LOOKUPS] += 1
-    out[:4] = 0.0
+    for k in range(4):
+        out[k] = 0.0
     add_bilinear(memory, first + lower, u, v, (1.0 - fraction) / 255.0, out)
     if fraction > 0.0:
         add_bilinear(memory, first + lower + 1, u, v, fraction / 255.0, out)
 
 
-@kernel
+@inlined
 def compare_depth(memory, texture, u, v, depth):
-    """Share of the four texels around (u, v) whose 32-bit value is ≥ `depth` (percentage-closer filtering).
+    """Share of the four texels around (u, v) whose 32-bit value is ≤ `depth` (percentage-closer filtering).
 
     Reeves et al. 1987; the edge is clamped: a shadow map does not repeat. Weighted bilinearly.
     """
-    level = memory.levels[memory.textures[texture, 0]]
-    w, h = level[1], level[2]
+    number = memory.textures[texture, 0]
+    w, h = memory.levels[number, 1], memory.levels[number, 2]
     x = min(max(u, 0.0), 1.0) * w - 0.5
     y = min(max(v, 0.0), 1.0) * h - 0.5
     left, low = math.floor(x), math.floor(y)
     s, t = x - left, y - low
     memory.counts[LOOKUPS] += 1
+    x0, x1 = min(max(np.int64(left), 0), w - 1), min(max(np.int64(left) + 1, 0), w - 1)
+    r0, r1 = h - 1 - min(max(np.int64(low), 0), h - 1), h - 1 - min(max(np.int64(low) + 1, 0), h - 1)
+    _use_four(memory, number, x0, x1, r0, r1)
     lit = 0.0
-    for j in range(2):
-        row = h - 1 - min(max(np.int64(low) + j, 0), h - 1)
-        for i in range(2):
-            column = min(max(np.int64(left) + i, 0), w - 1)
-            texel = memory.texels[read_texel(memory, level, column, row)]
-            value = (
-                np.int64(texel[0]) << 24 | np.int64(texel[1]) << 16 | np.int64(texel[2]) << 8 | np.int64(texel[3])
-            )
-            weight = (s if i else 1.0 - s) * (t if j else 1.0 - t)
-            if value >= depth:
-                lit += weight
+    for corner in range(4):
+        row, column = r0 if corner < 2 else r1, x0 if corner % 2 == 0 else x1
+        texel = memory.levels[number, 0] + row * w + column
+        value = np.int64(0)
+        for k in range(4):
+            value = value << 8 | np.int64(memory.texels[texel, k])
+        if value <= depth:
+            lit += (1.0 - s if corner % 2 == 0 else s) * (1.0 - t if corner < 2 else t)
     return lit
