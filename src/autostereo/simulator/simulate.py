@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from ..display.rig import Rig
 from ..errors import InputError
@@ -23,6 +24,7 @@ from .workload import Workload
 MAX_SIDE, MAX_VIEWS = 8192, 256
 SIZE = (640, 480)
 T = TypeVar("T")
+Counts = NDArray[np.int64]
 
 
 def simulate(
@@ -55,14 +57,14 @@ def simulate(
     view = make_view(rig, size)
     shape = (rig.views, size[1], size[0])
     pictures = Pictures.empty(shape, workload.background, maps)
-    passes = []
-    at_once = machine.traversal.views or rig.views
-    for first in range(0, rig.views, at_once):
-        state = Pass(workload, machine, rig, view, (first, min(first + at_once, rig.views)), pictures)
+    tally = Tally(machine)
+    for span in _spans(rig, machine):
+        state = Pass(workload, machine, rig, view, span, pictures)
         state.draw_all(Setting())
         state.finish()
-        passes.append(state)
-    return report_of(machine, workload, passes, pictures)
+        tally.add(state)
+    color = pictures.colors.view(np.uint8).reshape(*pictures.colors.shape, 4)
+    return tally.report(workload.name, pictures, color)
 
 
 def simulate_accumulation(
@@ -76,7 +78,7 @@ def simulate_accumulation(
     Returns
     -------
     Report
-        `color` (1, H, W, 4) is the mean; `depth` (1, H, W) that of the last row's first view.
+        `color` (1, H, W, 4) is the mean; `depth` that of the last row's views.
     """
     if not rigs:
         raise InputError("rigs: expected at least one")
@@ -84,23 +86,28 @@ def simulate_accumulation(
     workload = _checked(scene, rigs[0], machine, size)
     pictures = Pictures.common(size, workload.background)
     settings = Setting(color=False), Setting(raster.EQUAL, True, 1.0 / samples)
-    passes = []
+    tally, stored = Tally(machine), None
     for rig in rigs:
         view = make_view(rig, size)
-        at_once = machine.traversal.views or rig.views
-        for first in range(0, rig.views, at_once):
-            state = Pass(workload, machine, rig, view, (first, min(first + at_once, rig.views)), pictures)
-            if passes:  # the colour buffer stays; only depths are cleared
-                state.color.stored[:] = passes[-1].color.stored
+        for span in _spans(rig, machine):
+            state = Pass(workload, machine, rig, view, span, pictures)
+            if stored is not None:  # the colour buffer stays, only depths are cleared
+                state.color.stored[:] = stored
             state.draw_twice(settings)
             state.finish()
-            passes = [*passes[:0], state] if not passes else [_merged(passes[0], state)]
-    total = pictures.total
-    opacity = np.clip(total[..., 3:], 0, 1)
-    rgb = np.clip(total[..., :3] + (1 - opacity) * np.array(workload.background, np.float32), 0, 1)
+            tally.add(state)
+            stored = state.color.stored
+    opacity = np.clip(pictures.total[..., 3:], 0, 1)
+    rgb = np.clip(pictures.total[..., :3] + (1 - opacity) * np.array(workload.background, np.float32), 0, 1)
     color = np.floor(255 * np.concatenate([rgb, opacity], axis=2) + 0.5).astype(np.uint8)
-    report = report_of(machine, workload, passes, pictures)
-    return Report(**(vars(report) | {"color": color[None], "depth": report.depth[:1]}))
+    return tally.report(workload.name, pictures, color[None])
+
+
+def _spans(rig: Rig, machine: Machine) -> Iterator[tuple[int, int]]:
+    """The views (first, end) of each pass."""
+    at_once = machine.traversal.views or rig.views
+    for first in range(0, rig.views, at_once):
+        yield first, min(first + at_once, rig.views)
 
 
 def simulate_all(
@@ -132,14 +139,22 @@ def _checked(scene: Scene | Workload, rig: Rig, machine: Machine, size: tuple[in
     return workload
 
 
-def report_of(machine: Machine, workload: Workload, passes: Sequence[Pass], pictures: Pictures) -> Report:
-    """Add up the counters of all passes over a frame."""
-    counters = dict.fromkeys(COUNTERS, 0)
-    line = machine.texture.line_bytes
-    if machine.texture.compression == "bc1":
-        line = line * BC1_BYTES // 64
-    for state in passes:
+class Tally:
+    """Adds up what the passes over a frame counted."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+        self.counters = dict.fromkeys(COUNTERS, 0)
+        self.of_view: Counts | int = 0
+        self.runs: Counts | int = 0
+        self.depth: NDArray[np.float32] | None = None
+
+    def add(self, state: Pass) -> None:
+        """The counters of one finished pass; the depths of its views."""
         texture, totals = state.memory.counts, state.fragments.totals
+        line = self.machine.texture.line_bytes
+        if self.machine.texture.compression == "bc1":
+            line = line * BC1_BYTES // 64
         found = {
             "texels": texture[ACCESSES], "texture_misses": texture[MISSES], "lookups": texture[LOOKUPS],
             "texture_bytes": texture[MISSES] * line,
@@ -154,16 +169,21 @@ def report_of(machine: Machine, workload: Workload, passes: Sequence[Pass], pict
                 f"{name}_raw": counts[buffers.RAW],
             }  # fmt: skip
         for name, value in found.items():
-            counters[name] += int(value)
-    of_view = sum(state.fragments.of_view for state in passes)
-    near = passes[0].view.near
-    z = sum(state.depth.values for state in passes)  # each pass has only its own views
-    with np.errstate(divide="ignore"):
-        depth = (near * raster.Z_SCALE / z).astype(np.float32)
-    views, height, width = z.shape
-    return Report(
-        machine.name, workload.name, views, (width, height), counters,
-        of_view[:, raster.COVERED], of_view[:, raster.PASSED], sum(state.target.runs for state in passes),
-        of_view[:, raster.REUSED], pictures.colors.view(np.uint8).reshape(*pictures.colors.shape, 4), depth,
-        pictures.how, pictures.misses,
-    )  # fmt: skip
+            self.counters[name] += int(value)
+        self.of_view = self.of_view + state.fragments.of_view
+        self.runs = self.runs + state.target.runs
+        first, last = state.span
+        if self.depth is None or first == 0:
+            self.depth = np.full(state.depth.values.shape, np.inf, np.float32)
+        with np.errstate(divide="ignore"):
+            self.depth[first:last] = state.view.near * raster.Z_SCALE / state.depth.values[first:last]
+
+    def report(self, scene: str, pictures: Pictures, color: NDArray[np.uint8]) -> Report:
+        """The sums, and the pictures (V, H, W, 4)."""
+        assert isinstance(self.of_view, np.ndarray) and isinstance(self.runs, np.ndarray) and self.depth is not None
+        views, height, width = self.depth.shape
+        return Report(
+            self.machine.name, scene, views, (width, height), self.counters,
+            self.of_view[:, raster.COVERED], self.of_view[:, raster.PASSED], self.runs, self.of_view[:, raster.REUSED],
+            color, self.depth, pictures.how, pictures.misses,
+        )  # fmt: skip

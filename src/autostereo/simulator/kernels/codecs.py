@@ -3,7 +3,7 @@
 Depths (after Morein 2000, as described by Hasselgren and Akenine-Möller, Efficient Depth Buffer Compression, 2006):
 differential pulse code modulation. A triangle's depths 1/d are affine in the picture, so second differences of the rounded
 values are −1, 0 or 1: two bits each. A block that is one plane takes an eighth; one that two planes share, each
-predicted from its own corner, takes half; all others are stored as they are.
+predicted from its own corner, takes three eighths; all others are stored as they are.
 
 Colours (after Rasmusson et al., Exact and Error-bounded Approximate Color Buffer Compression and Decompression, 2007):
 reversible YCoCg, the median predictor, Golomb–Rice codes with one parameter a channel; in steps of 32 bytes. The machine

@@ -102,9 +102,10 @@ def level(at, dx, dy, eye, uniforms, memory, units, out):
 def shadows(at, dx, dy, eye, uniforms, memory, units, out):
     """Adaptive soft shadows (Uralsky 2005) with bump and gloss maps.
 
-    Attributes: uv, normal, tangent, position, place in the shadow map (u, v, depth as there / 2³²). Units: colour, bump,
-    gloss, shadow map. uniforms: unit vector to the light, radius of the penumbra in the map, bias. 8 samples on the rim;
-    only where they disagree 56 more, so penumbras alone are dear. Four texels a sample.
+    Attributes: uv, normal, tangent, position, place seen from the light (X, Y in widths of the map at depth 1, depth). Units:
+    colour, bump, gloss, shadow map. uniforms: unit vector to the light, radius of the penumbra in the map, relative
+    bias, near plane of the light. 8 samples on the rim; only where they disagree 56 more, so penumbras alone are dear.
+    Four texels a sample.
     """
     bump, gloss = memory.colors[0], memory.colors[1]
     _filtered(memory, units[0], at, dx, dy, 0, out)
@@ -117,17 +118,18 @@ def shadows(at, dx, dy, eye, uniforms, memory, units, out):
     nx, ny, nz = _unit(p * tx + q * bx + s * nx, p * ty + q * by + s * ny, p * tz + q * bz + s * nz)
     lx, ly, lz = uniforms[0], uniforms[1], uniforms[2]
     cosine = nx * lx + ny * ly + nz * lz
-    depth = (at[13] + uniforms[4]) * 4294967296.0
+    u, v = 0.5 + at[11] / at[13], 0.5 + at[12] / at[13]
+    depth = uniforms[5] * (1.0 - uniforms[4]) / at[13] * 4294967296.0
     lit = 0.0
     for i in range(8):
         lit += compare_depth(
-            memory, units[3], at[11] + uniforms[3] * DISC[i, 0], at[12] + uniforms[3] * DISC[i, 1], depth
+            memory, units[3], u + uniforms[3] * DISC[i, 0], v + uniforms[3] * DISC[i, 1], depth
         )
     share = lit / 8.0
     if 0.0 < lit < 8.0:
         for i in range(8, 64):
             lit += compare_depth(
-                memory, units[3], at[11] + uniforms[3] * DISC[i, 0], at[12] + uniforms[3] * DISC[i, 1], depth
+                memory, units[3], u + uniforms[3] * DISC[i, 0], v + uniforms[3] * DISC[i, 1], depth
             )
         share = lit / 64.0
     diffuse, highlight = 0.0, 0.0
@@ -147,14 +149,14 @@ def ocean(at, dx, dy, eye, uniforms, memory, units, out):
     on the eye, then foam: seven trilinear look-ups, of which two are dependent.
 
     Attributes: place on the water (x, z; world), position (eye space), world height. Units: bump, sky, sea floor, foam.
-    uniforms: time, eye height above the water, then world_from_eye rotation (9) and the world x, z of the centre camera.
+    uniforms: time, eye height above the water, then world_from_eye rotation (9).
     """
     bump, floor, foam = memory.colors[0], memory.colors[1], memory.colors[2]
     sx, sz = 0.0, 0.0
     time = uniforms[0]
     footprint = math.sqrt(max(dx[0] * dx[0] + dx[1] * dx[1], dy[0] * dy[0] + dy[1] * dy[1]))
     for k in range(4):
-        scale = 0.11 * 1.9**k
+        scale = 0.03 * 1.7**k
         u = at[0] * scale + time * 0.03 * (k + 1)
         v = at[1] * scale + time * 0.02 * (2 - k)
         trilinear(memory, units[0], u, v, dx[0] * scale, dx[1] * scale, dy[0] * scale, dy[1] * scale, bump)
@@ -172,16 +174,16 @@ def ocean(at, dx, dy, eye, uniforms, memory, units, out):
     rx, ry, rz = ix + 2.0 * cosine * nx, iy + 2.0 * cosine * ny, iz + 2.0 * cosine * nz
     up = max(ry, 0.08)
     # bumps that pass between neighbouring pixels turn the rays apart: what finite differences would have found
-    rough = min(1.0, footprint * 4.0) * 0.12
-    sky_u, sky_v = 0.4 * rx / up, 0.4 * rz / up
-    spread = rough * 0.4 / up
+    rough = min(1.0, footprint * 4.0) * 0.06
+    sky_u, sky_v = 0.15 * rx / up, 0.15 * rz / up
+    spread = rough * 0.15 / up
     trilinear(memory, units[1], sky_u, sky_v, spread, 0.0, 0.0, spread, out)
     eta = 0.75
     inside = max(1.0 - eta * eta * (1.0 - cosine * cosine), 0.0)
     bend = eta * cosine - math.sqrt(inside)
     fx, fy, fz = eta * ix + bend * nx, eta * iy + bend * ny, eta * iz + bend * nz
     reach = 2.5 / max(-fy, 0.2)
-    scale = 0.12
+    scale = 0.06
     spread = rough * reach * scale
     trilinear(
         memory, units[2], (at[0] + fx * reach) * scale, (at[1] + fz * reach) * scale,

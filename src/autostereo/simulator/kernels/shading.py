@@ -86,7 +86,7 @@ class Target(NamedTuple):
 
 @inlined
 def put(color, v, x, y, blend, weight, target):
-    """One fragment into the colour buffer; returns nothing, leaves in color (4,) what the buffer holds then."""
+    """One fragment into the colour buffer; color (4,) becomes what a view's buffer holds then."""
     buffer = target.buffer
     plane = 0 if blend == ACCUMULATE else v
     block = (plane * buffer.down + y // buffer.block_h) * buffer.across + x // buffer.block_w
@@ -96,8 +96,9 @@ def put(color, v, x, y, blend, weight, target):
         need(buffer, block, slot, bit)
     mark(buffer, slot, bit)
     if blend == ACCUMULATE:
-        for c in range(4):
+        for c in range(3):
             target.total[y, x, c] += np.float32(weight * color[c])
+        target.total[y, x, 3] += np.float32(weight)  # what is seen of a sample is opaque
         return
     old = np.int64(buffer.values[v, y, x])
     word = np.int64(0)
