@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import autostereo as aus
-from autostereo.simulator import Draw, Machine, Workload, simulate, simulate_accumulation, simulate_all
+from autostereo.simulator import Draw, Machine, Workload, in_parallel, simulate, simulate_accumulation
 from autostereo.simulator.scenes import SCENES
 from sim_scenes import MULTI, RIG, SIZE, layers, wall
 
@@ -198,6 +198,6 @@ def test_scenes_fill_their_pictures_and_move(name):
 
 def test_counters_do_not_depend_on_threads():
     frames = [SCENES["level"].at(number, 2) for number in (0, 50, 100)]
-    together = simulate_all(frames, lambda frame: simulate(*frame, MULTI, size=(64, 48)))
+    together = in_parallel(frames, lambda frame: simulate(*frame, MULTI, size=(64, 48)))
     alone = [simulate(*frame, MULTI, size=(64, 48)) for frame in frames]
     assert [r.as_dict() for r in together] == [r.as_dict() for r in alone]

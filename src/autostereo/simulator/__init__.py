@@ -6,11 +6,11 @@ engines; its pictures equal theirs.
 
 from .machine import BufferCache, Machine, Shading, TextureCache, Traversal
 from .report import Report
-from .simulate import simulate, simulate_accumulation, simulate_all
+from .simulate import in_parallel, simulate, simulate_accumulation
 from .textures import Texture
 from .workload import Draw, Workload
 
 __all__ = [
-    "BufferCache", "Draw", "Machine", "Report", "Shading", "Texture", "TextureCache", "Traversal", "Workload", "simulate",
-    "simulate_accumulation", "simulate_all",
+    "BufferCache", "Draw", "Machine", "Report", "Shading", "Texture", "TextureCache", "Traversal", "Workload", "in_parallel",
+    "simulate", "simulate_accumulation",
 ]  # fmt: skip

@@ -24,6 +24,7 @@ from .workload import Workload
 MAX_SIDE, MAX_VIEWS = 8192, 256
 SIZE = (640, 480)
 T = TypeVar("T")
+R = TypeVar("R")
 Counts = NDArray[np.int64]
 
 
@@ -110,18 +111,10 @@ def _spans(rig: Rig, machine: Machine) -> Iterator[tuple[int, int]]:
         yield first, min(first + at_once, rig.views)
 
 
-def simulate_all(
-    frames: Iterable[T], simulate_one: Callable[[T], Report], progress: Callable[[], None] = lambda: None
-) -> list[Report]:
-    """Frames in parallel, one thread for each core Numba may use; the reports are in order and do not depend on it."""
+def in_parallel(items: Iterable[T], work: Callable[[T], R]) -> list[R]:
+    """Results of `work`, in order: one thread for each core that Numba may use, as kernels hold no lock."""
     with ThreadPoolExecutor(numba.get_num_threads()) as pool:
-
-        def one(frame: T) -> Report:
-            report = simulate_one(frame)
-            progress()
-            return report
-
-        return list(pool.map(one, frames))
+        return list(pool.map(work, items))
 
 
 def _checked(scene: Scene | Workload, rig: Rig, machine: Machine, size: tuple[int, int]) -> Workload:
