@@ -144,7 +144,7 @@ def test_a_wall_writes_every_block_once(fast_clear):
 def test_blending_reads_what_it_mixes_with():
     """A second layer in front: every block of the first has left a small cache, and is read again."""
     first = wall().draws[0]
-    fields = vars(first) | {"corners": first.corners + (0, 0, 0.5)}
+    fields = vars(first) | {"corners": first.corners + np.array([0, 0, 0.5])}
     both = [Workload((first, Draw(**(fields | {"blend": blend}))), wall().textures) for blend in ("add", "replace")]
     machine = MULTI.with_(depth=FULL | {"z_max": False}, color=FULL)
     added, replaced = (simulate(workload, RIG, machine, size=(64, 48)) for workload in both)

@@ -37,7 +37,8 @@ class Kernels:
     def inlined(self, function: Callable[..., Any]) -> Callable[..., Any]:
         """Compile `function` into its callers: for the small steps of an inner loop.
 
-        Without reference counting (`_nrt`): it neither makes nor keeps arrays, and atomic counts cost as much as a pixel.
+        Without reference counting (`_nrt`): it neither makes nor keeps arrays, and atomic counts cost as much as a
+        pixel.
         """
         return self._compile(function, forceinline=True, _nrt=False)
 

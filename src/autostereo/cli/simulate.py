@@ -51,9 +51,9 @@ def simulate(
 ) -> None:
     """Count the bytes that multi-view rasterisation hardware moves (Hasselgren and Akenine-Möller 2006).
 
-    Built-in machines: multi-view (each triangle to all views, tiles sorted for the texture cache), multi-view-approximate,
-    scanline, by-triangle (not sorted), bf-tx and bf-dc (view by view, the same bytes of cache spent on textures, or on
-    depth and colour). Their .toml files are models for your own.
+    Built-in machines: multi-view (each triangle to all views, tiles sorted for the texture cache),
+    multi-view-approximate, scanline, by-triangle (not sorted), bf-tx and bf-dc (view by view, the same bytes of cache
+    spent on textures, or on depth and colour). Their .toml files are models for your own.
 
     Examples:
       autostereo simulate level
@@ -73,6 +73,7 @@ def simulate(
         raise InputError(f"--every: expected a number from 1 to {PATH}, got {every}")
     if not aperture > 0:
         raise InputError(f"--aperture: expected a number > 0, got {aperture:g}")
+    samples = common.parse_pair(lens, "--depth-of-field", 64) if lens else (1, 1)
     if picture is not None and lens is not None:
         raise InputError("--picture: shows views, not --depth-of-field")
     for path, suffixes in ((json, (".json",)), (chart, (".png", ".svg", ".pdf"))):
@@ -86,11 +87,11 @@ def simulate(
     if chart is not None:
         output.need_matplotlib()
     name, source, frames = _source(scene, max(counts), pixels, camera, side, every)
-    if not is_compiled("shade_fragments", "rasterize"):
+    if not is_compiled("_shade_fragments", "rasterize"):
         common.note("compiling kernels (once, about a minute)…")
     work: study.Study | study.FieldStudy
     if lens is not None:
-        work = study.FieldStudy(source, machines, common.parse_pair(lens, "--depth-of-field", 64), aperture, counts, frames[:1], pixels)
+        work = study.FieldStudy(source, machines, samples, aperture, counts, frames[:1], pixels)
         steps = len(counts) * len(machines)
     else:
         work = study.Study(name, source, machines, counts, frames, pixels)

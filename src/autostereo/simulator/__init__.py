@@ -11,6 +11,6 @@ from .textures import Texture
 from .workload import Draw, Workload
 
 __all__ = [
-    "BufferCache", "Draw", "Machine", "Report", "Shading", "Texture", "TextureCache", "Traversal", "Workload", "in_parallel",
-    "simulate", "simulate_accumulation",
+    "BufferCache", "Draw", "Machine", "Report", "Shading", "Texture", "TextureCache", "Traversal", "Workload",
+    "in_parallel", "simulate", "simulate_accumulation",
 ]  # fmt: skip

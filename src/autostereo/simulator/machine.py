@@ -80,8 +80,8 @@ class Traversal:
 class TextureCache:
     """The texture cache: `bytes`, and `bytes_per_added_view` for each view beyond the first.
 
-    `ways` = 0 is fully associative. `compression` "bc1": textures take 4 bits a texel in memory, decompressed on the way into
-    the cache.
+    `ways` = 0 is fully associative. `compression` "bc1": textures take 4 bits a texel in memory, and are decompressed
+    on the way into the cache.
     """
 
     bytes: int = 6144
@@ -218,7 +218,8 @@ class Machine:
         (tw, th), (bw, bh) = self.traversal.tile, self.depth.block
         if (self.depth.z_max or self.depth.z_min) and (bw % tw or bh % th):
             raise InputError(
-                f"machine depth: z_max and z_min need tiles that blocks consist of; got tiles {tw}×{th}, blocks {bw}×{bh}"
+                f"machine depth: z_max and z_min need tiles that blocks consist of; "
+                f"got tiles {tw}×{th}, blocks {bw}×{bh}"
             )
         if self.shading.approximate and self.traversal.order == "by-view":
             raise InputError('machine shading.approximate: needs order "sorted" or "by-triangle", got "by-view"')
@@ -231,7 +232,8 @@ class Machine:
     def check_size(self, size: tuple[int, int]) -> None:
         """Refuse pictures that are smaller than a tile or a block."""
         for name, (w, h) in (
-            ("traversal.tile", self.traversal.tile), ("depth.block", self.depth.block), ("color.block", self.color.block)
+            ("traversal.tile", self.traversal.tile), ("depth.block", self.depth.block), ("color.block",
+            self.color.block)
         ):  # fmt: skip
             if w > size[0] or h > size[1]:
                 raise InputError(f"machine {name}: {w}×{h} is larger than the frame of {size[0]}×{size[1]}")

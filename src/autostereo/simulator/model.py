@@ -70,8 +70,9 @@ def predict(
 def compare(report: Report) -> dict[str, dict[str, float]]:
     """What the formulas say beside what the machine did, in bytes for each pixel of a view.
 
-    "predicted": from the measured d alone, with o(d) and m = 1/4. "measured": the machine's bytes, with all that it saves by
-    caches and compression. "fitted": the formulas with measured overdraw and miss rate; its texture term is exact.
+    "predicted": from the measured d alone, with o(d) and m = 1/4. "measured": the machine's bytes, with all that it
+    saves by caches and compression. "fitted": the formulas with measured overdraw and miss rate; its texture term is
+    exact.
     """
     pixels = report.views * report.size[0] * report.size[1]
     d, o = float(report.covered.sum() / pixels), float(report.passed.sum() / pixels)

@@ -40,7 +40,7 @@ def show(rows: Rows) -> None:
             str(row["views"]), row["machine"], f"{row['texture'] / 1e6:.2f}", _share(row["texture"], first["texture"]),
             f"{low / 1e6:.2f} … {high / 1e6:.2f}", f"{row['depth'] / 1e6:.2f}", f"{row['color'] / 1e6:.2f}",
             f"{row['total'] / 1e6:.2f}", _share(row["total"], first["total"]), f"{row['miss_rate']:.3f}",
-            f"{row['shaded'] / 1e6:.3f}", f"{row['share_approximated']:.1%}" if row["share_approximated"] else "", quality,
+            f"{row['shaded'] / 1e6:.3f}", _share(row["share_approximated"], 1.0), quality,
             f"{row['texels_per_second'] / 1e6:.0f}",
         )  # fmt: skip
     console.print(table)
@@ -48,7 +48,7 @@ def show(rows: Rows) -> None:
 
 
 def _share(value: float, base: float) -> str:
-    return f"{value / base:.1%}" if base else ""
+    return f"{value / base:.1%}" if base and value else ""
 
 
 def _model_table(rows: Rows) -> Any:

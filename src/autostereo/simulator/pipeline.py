@@ -4,25 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..display.rig import Rig
-from .kernels import raster, shading
+from .kernels import raster, shading, state
 from .kernels.buffers import COLOR, DEPTH, NONE, WRITTEN, Buffer, flush
 from .kernels.geometry import View
 from .kernels.lru import make_lru
-from .kernels.raster import Fragments, Plan, Scratch
 from .kernels.shading import Target, Work
+from .kernels.state import Fragments, Plan, Scratch
 from .machine import BufferCache, Machine
 from .textures import TextureStore
 from .workload import BLENDS, SHADERS, Draw, Workload, attributes_in_eye_space, lights_in_eye_space
 
 MIN_FRAGMENTS = 1 << 16  # of the list between rasteriser and shading: what fits the processor's caches
-ACCUMULATION_BYTES = 8  # a pixel of the common colour buffer: 16 bits a channel, since 1/256 of a colour is less than one of 8 bits
+ACCUMULATION_BYTES = 8  # a pixel of the common colour buffer: 1/256 of a colour is less than a level of 8 bits
 
 
 def make_view(rig: Rig, size: tuple[int, int]) -> View:
@@ -49,9 +49,10 @@ def prepare_textures(workload: Workload, machine: Machine) -> TextureStore:
 
 @dataclass(frozen=True)
 class Setting:
-    """How a pass writes: `depth_test` of `kernels.raster`, whether colours are made, and the weight of accumulated ones."""
+    """How a pass writes: `depth_test` of `kernels.raster`, whether colours are made, and the weight of accumulated
+    ones."""
 
-    depth_test: int = raster.LESS
+    depth_test: int = state.LESS
     color: bool = True
     weight: float = 0.0  # 0: each view has its own colour buffer
 
@@ -83,7 +84,8 @@ class Pass:
         self.depth = _buffer(machine.depth, np.zeros(shape, np.uint32), count, DEPTH, 4)
         accumulates = len(pictures.total) > 0
         self.color = _buffer(
-            machine.color, pictures.colors, count, NONE if accumulates else COLOR, ACCUMULATION_BYTES if accumulates else 4
+            machine.color, pictures.colors, count, NONE if accumulates else COLOR, ACCUMULATION_BYTES if accumulates
+            else 4
         )
         capacity = max(MIN_FRAGMENTS, view.width * machine.traversal.tile[1] * count)
         self.fragments = _fragments(capacity, views)
@@ -123,22 +125,22 @@ class Pass:
 
     def _draw_views(self, plan: Plan, setting: Setting) -> None:
         for draw in self.workload.draws:
-            depth_write = draw.depth_write and setting.depth_test == raster.LESS
+            depth_write = draw.depth_write and setting.depth_test == state.LESS
             self._draw(draw, plan._replace(depth_test=setting.depth_test, depth_write=depth_write), setting)
 
     def _draw(self, draw: Draw, plan: Plan, setting: Setting) -> None:
         work, shade = self._work(draw, setting)
         cursor = self.fragments.cursor
-        cursor[:] = 0, 0, 0, 0, cursor[raster.BASE]
+        cursor[:] = 0, 0, 0, 0, cursor[state.BASE]
         done = False
         while not done:
             done = raster.rasterize(
                 work.corners, draw.facing, self.view, plan, self.depth, self.shadow, self.fragments, self.scratch
             )
-            if setting.color and cursor[raster.COUNT]:
+            if setting.color and cursor[state.COUNT]:
                 shade(self.fragments, work, self.view, self.memory, self.target)
-            cursor[raster.BASE] += cursor[raster.COUNT]
-            cursor[raster.COUNT] = 0
+            cursor[state.BASE] += cursor[state.COUNT]
+            cursor[state.COUNT] = 0
 
     def _work(self, draw: Draw, setting: Setting) -> tuple[Work, Callable[..., Any]]:
         key = id(draw)
@@ -221,18 +223,18 @@ def _buffer(part: BufferCache, values: NDArray[np.uint32], views: int, codec: in
 
 
 def _fragments(capacity: int, views: int) -> Fragments:
-    whole = [np.zeros(capacity, np.int32) for _ in range(6)]
-    taps = capacity * raster.MAX_TAPS
+    whole = partial(np.zeros, capacity, np.int32)
+    taps = capacity * state.MAX_TAPS
     return Fragments(
-        *whole, np.zeros(taps, np.int32), np.zeros(taps, np.float32), np.zeros(5, np.int64),
-        np.zeros((views, 3), np.int64), np.zeros(4, np.int64),
+        whole(), whole(), whole(), whole(), whole(), whole(), np.zeros(taps, np.int32),
+        np.zeros(taps, np.float32), np.zeros(5, np.int64), np.zeros((views, 3), np.int64), np.zeros(4, np.int64),
     )  # fmt: skip
 
 
 def _plan(machine: Machine, span: tuple[int, int], views: int) -> Plan:
     options, traversal = machine.shading, machine.traversal
-    measures = {"axis": raster.AXIS, "dot": raster.DOT, "axis-unsigned": raster.UNSIGNED}
-    order = measures[traversal.measure] if traversal.order == "sorted" else raster.IN_TURN
+    measures = {"axis": state.AXIS, "dot": state.DOT, "axis-unsigned": state.UNSIGNED}
+    order = measures[traversal.measure] if traversal.order == "sorted" else state.IN_TURN
     first, last = span
     sets = min(options.sets, last - first)
     group = np.zeros(views, np.int64)
@@ -242,7 +244,7 @@ def _plan(machine: Machine, span: tuple[int, int], views: int) -> Plan:
         members = [np.nonzero(group[first:last] == g)[0] + first for g in range(sets)]
         exact[:] = [(m[0] + m[-1]) // 2 for m in members]
     return Plan(
-        *traversal.tile, order, first, last, machine.depth.z_max, machine.depth.z_min, raster.LESS, True,
+        *traversal.tile, order, first, last, machine.depth.z_max, machine.depth.z_min, state.LESS, True,
         options.approximate, group, exact, options.tiles, options.filter == "tent",
         options.single_neighbour == "use", options.approximate and options.source == "color-buffer",
     )  # fmt: skip
@@ -252,7 +254,8 @@ def _scratch(plan: Plan, view: View, blocks: int) -> Scratch:
     views, groups = len(view.offsets), len(plan.exact)
     tiles = -(-view.width // plan.tile_w)
     return Scratch(
-        np.zeros((views, 3, 3)), np.zeros(views), np.zeros(views), *(np.zeros(views, np.int64) for _ in range(3)),
+        np.zeros((views, 3, 3)), np.zeros(views), np.zeros(views),
+        np.zeros(views, np.int64), np.zeros(views, np.int64), np.zeros(views, np.int64),
         np.zeros(groups, np.int64), np.full((groups, plan.tile_h, view.width), -1, np.int32),
         np.full((groups, tiles), -1, np.int64), np.zeros(groups, np.int64), np.zeros((4, 3)),
         np.zeros(blocks if plan.from_buffer else 1, np.int64),

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ..display.rig import Rig
 from ..errors import InputError
 from ..scene.scene import Scene
-from .kernels import buffers, raster
+from .kernels import buffers
+from .kernels import state as layout
 from .kernels.textures import ACCESSES, LOOKUPS, MISSES
 from .machine import Machine
 from .pipeline import Pass, Pictures, Setting, make_view, prepare_textures
@@ -73,8 +74,9 @@ def simulate_accumulation(
 ) -> Report:
     """Draw the mean of many views, such as depth of field, into one colour buffer (Hasselgren 2006, section 4.4).
 
-    Each rig is a row of samples, all with the same number of views. For each row the machine draws depths first, colours off, then
-    colours where depths are equal, added with weight 1/n. The colour buffer has 16 bits a channel, see `pipeline.py`.
+    Each rig is a row of samples, all with the same number of views. For each row the machine draws depths first,
+    colours off, then colours where depths are equal, added with weight 1/n. The colour buffer has 16 bits a channel,
+    see `pipeline.py`.
 
     Returns
     -------
@@ -86,7 +88,7 @@ def simulate_accumulation(
     samples = sum(rig.views for rig in rigs)
     workload = _checked(scene, rigs[0], machine, size)
     pictures = Pictures.common(size, workload.background)
-    settings = Setting(color=False), Setting(raster.EQUAL, True, 1.0 / samples)
+    settings = Setting(color=False), Setting(layout.EQUAL, True, 1.0 / samples)
     tally, stored = Tally(machine), None
     for rig in rigs:
         view = make_view(rig, size)
@@ -151,8 +153,8 @@ class Tally:
         found = {
             "texels": texture[ACCESSES], "texture_misses": texture[MISSES], "lookups": texture[LOOKUPS],
             "texture_bytes": texture[MISSES] * line,
-            "tiles": totals[raster.TILES], "tiles_culled": totals[raster.CULLED],
-            "rows": totals[raster.ROWS], "horizon_rows": totals[raster.HORIZON],
+            "tiles": totals[layout.TILES], "tiles_culled": totals[layout.CULLED],
+            "rows": totals[layout.ROWS], "horizon_rows": totals[layout.HORIZON],
         }  # fmt: skip
         for name, buffer in (("depth", state.depth), ("color", state.color)):
             counts = buffer.counts
@@ -169,7 +171,7 @@ class Tally:
         if self.depth is None or first == 0:
             self.depth = np.full(state.depth.values.shape, np.inf, np.float32)
         with np.errstate(divide="ignore"):
-            self.depth[first:last] = state.view.near * raster.Z_SCALE / state.depth.values[first:last]
+            self.depth[first:last] = state.view.near * layout.Z_SCALE / state.depth.values[first:last]
 
     def report(self, scene: str, pictures: Pictures, color: NDArray[np.uint8]) -> Report:
         """The sums, and the pictures (V, H, W, 4)."""
@@ -177,6 +179,6 @@ class Tally:
         views, height, width = self.depth.shape
         return Report(
             self.machine.name, scene, views, (width, height), self.counters,
-            self.of_view[:, raster.COVERED], self.of_view[:, raster.PASSED], self.runs, self.of_view[:, raster.REUSED],
+            self.of_view[:, layout.COVERED], self.of_view[:, layout.PASSED], self.runs, self.of_view[:, layout.REUSED],
             color, self.depth, pictures.how, pictures.misses,
         )  # fmt: skip

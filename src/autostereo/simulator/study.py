@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from time import perf_counter
 from typing import Any
 
@@ -46,11 +47,11 @@ class Study:
         """One row for each machine and number of views, in that order: means over the frames, and their spread."""
         rows = []
         for views in self.views:
-            of_frame = in_parallel(self.frames, lambda number, views=views: self._frame(number, views, progress))
+            of_frame = in_parallel(self.frames, partial(self._frame, views, progress))
             rows += [_summary([figures[k] for figures in of_frame]) for k in range(len(self.machines))]
         return rows
 
-    def _frame(self, number: int, views: int, progress: Callable[[], None]) -> list[dict[str, Any]]:
+    def _frame(self, views: int, progress: Callable[[], None], number: int) -> list[dict[str, Any]]:
         workload, rig = self.source(number, views)
         exact: Report | None = None
         rows = []
@@ -151,7 +152,8 @@ class FieldStudy:
                 workload, rig = self.source(number, 1)
                 machine = case[0].with_(traversal={"views": case[1]})
                 start = perf_counter()
-                report = simulate_accumulation(workload, lens(rig, self.samples, self.aperture), machine, size=self.size)
+                rigs = lens(rig, self.samples, self.aperture)
+                report = simulate_accumulation(workload, rigs, machine, size=self.size)
                 figures = figures_of(report, case[0], perf_counter() - start)
                 rows.append(figures | {"views": case[1]})
                 progress()

@@ -69,7 +69,7 @@ def _halved(values: NDArray[np.float32], axis: int) -> NDArray[np.float32]:
     return np.moveaxis(np.asarray(result, np.float32), 0, axis)
 
 
-# --- texture compression (BC1, S3TC DXT1): lossy, four colours of a line for each block of 4×4 ----------------------------
+# --- texture compression (BC1, S3TC DXT1): lossy, four colours of a line for each block of 4×4 ------------------------
 def encode_bc1(level: Bytes) -> NDArray[np.uint32]:
     """Blocks (n, 2) of 32-bit words: two colours of 5, 6, 5 bits, then 16 indices of two bits; alpha is dropped.
 
@@ -127,7 +127,7 @@ def _palette(high: NDArray[np.uint32], low: NDArray[np.uint32]) -> NDArray[np.fl
     return np.stack([a, b, (2 * a + b) / 3, (a + 2 * b) / 3], axis=1)
 
 
-# --- memory -------------------------------------------------------------------------------------------------------------
+# --- memory -----------------------------------------------------------------------------------------------------------
 def block_shape(line_bytes: int) -> tuple[int, int]:
     """Log2 of width and height of the block of texels that a line holds: square, or twice as wide as high."""
     bits = (line_bytes // TEXEL_BYTES).bit_length() - 1

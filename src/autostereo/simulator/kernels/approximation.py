@@ -4,8 +4,8 @@ A fragment of an approximated view maps to the same row of the exact view. Its p
 
     x_e = x_a + fx·(v_e − v_a)·(1/focal − 1/d),
 
-which is equation (5) after homogenisation. The fragments to its left and right there are mixed, if the shader output cache
-still has them.
+which is equation (5) after homogenisation. The fragments to its left and right there are mixed, if the shader output
+cache still has them.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 
 from .compiling import inlined
 from .geometry import slope_a, slope_b
+from .state import BASE, MAX_TAPS
 
 
 @inlined
@@ -31,7 +32,7 @@ def _cached(x, row, group, plan, view, color, fragments, scratch):
     if plan.from_buffer:
         y = fragments.y[source]
         block = (scratch.exact[group] * color.down + y // color.block_h) * color.across + x // color.block_w
-        if color.cache.slot_of[block] < 0 or fragments.cursor[4] + source < scratch.since[block]:
+        if color.cache.slot_of[block] < 0 or fragments.cursor[BASE] + source < scratch.since[block]:
             return np.int64(-1)
     elif scratch.stamp[group, x // plan.tile_w] <= scratch.clock[group] - plan.entries:
         return np.int64(-1)
@@ -64,7 +65,7 @@ def find_taps(n, inverse_depth, edges, y0, view, plan, color, fragments, scratch
     exact = scratch.exact[group]
     if exact < 0:
         return False
-    fragments.tap_first[n] = 8 * n
+    fragments.tap_first[n] = MAX_TAPS * n
     shift = view.fx * (view.offsets[exact] - view.offsets[v]) * (1.0 / view.focal - inverse_depth)
     position = x + shift  # in columns: column j is sampled at j
     row = y - y0
@@ -78,9 +79,10 @@ def find_taps(n, inverse_depth, edges, y0, view, plan, color, fragments, scratch
         return False
     if plan.tent:
         det = scratch.det[v]
-        start = _position(x - 0.5, y + 0.5, v, exact, edges, det, view) - 0.5  # the kernel reaches one pixel to either side
+        # the kernel reaches one pixel to either side
+        start = _position(x - 0.5, y + 0.5, v, exact, edges, det, view) - 0.5
         stop = _position(x + 1.5, y + 0.5, v, exact, edges, det, view) - 0.5
-        if stop - start > 2.0 and stop - start < 7.0:
+        if stop - start > 2.0 and stop - start < MAX_TAPS - 1:
             total = 0.0
             for j in range(np.int64(math.ceil(start)), np.int64(math.floor(stop)) + 1):
                 source = _cached(j, row, group, plan, view, color, fragments, scratch)

@@ -1,8 +1,8 @@
 """Depth and colour buffers behind a cache of blocks: what is read and written, in bytes.
 
 The values themselves are always current in `values`; the cache only says what passes between it and memory. A block is
-fetched when something is first read from it, or when it leaves and was not written as a whole. It is written back when it
-leaves, compressed if that is on; `stored` is its size in memory, 0 while it is known to be clear (fast clear).
+fetched when something is first read from it, or when it leaves and was not written as a whole. It is written back when
+it leaves, compressed if that is on; `stored` is its size in memory, 0 while it is known to be clear (fast clear).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from .codecs import color_size, depth_size
 from .compiling import inlined, kernel
 from .lru import FREE, HIT, touch
 
-READ, WRITTEN, HITS, MISSES, RAW, PACKED = range(6)  # counts; RAW and PACKED are the write-backs without and with compression
+READ, WRITTEN, HITS, MISSES, RAW, PACKED = range(6)  # RAW and PACKED: write-backs without and with compression
 NONE, DEPTH, COLOR = range(3)  # codecs
 
 

@@ -1,13 +1,13 @@
 """Lossless compression of blocks of depths and colours, as hardware does it: sizes, and the codes themselves.
 
 Depths (after Morein 2000, as described by Hasselgren and Akenine-Möller, Efficient Depth Buffer Compression, 2006):
-differential pulse code modulation. A triangle's depths 1/d are affine in the picture, so second differences of the rounded
-values are −1, 0 or 1: two bits each. A block that is one plane takes an eighth; one that two planes share, each
+differential pulse code modulation. A triangle's depths 1/d are affine in the picture, so second differences of the
+rounded values are −1, 0 or 1: two bits each. A block that is one plane takes an eighth; one that two planes share, each
 predicted from its own corner, takes three eighths; all others are stored as they are.
 
 Colours (after Rasmusson et al., Exact and Error-bounded Approximate Color Buffer Compression and Decompression, 2007):
-reversible YCoCg, the median predictor, Golomb–Rice codes with one parameter a channel; in steps of 32 bytes. The machine
-of 2006 cites a patent on multi-sampled colours [MSM*04], which has nothing to gain at one sample a pixel.
+reversible YCoCg, the median predictor, Golomb–Rice codes with one parameter a channel; in steps of 32 bytes. The
+machine of 2006 cites a patent on multi-sampled colours [MSM*04], which has nothing to gain at one sample a pixel.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ def _round_up(size):
 def second_differences(values, x0, y0, w, h, out):
     """Differences that are small where depths are affine, into out (h, w). False where the block leaves the buffer.
 
-    out[0, 0] is the value itself, out[0, 1] and out[1, 0] are first differences; along the first two rows differences of
-    neighbouring differences, below them second differences down the columns.
+    out[0, 0] is the value itself, out[0, 1] and out[1, 0] are first differences; along the first two rows differences
+    of neighbouring differences, below them second differences down the columns.
     """
     if x0 + w > values.shape[1] or y0 + h > values.shape[0]:
         return False

@@ -102,10 +102,10 @@ def level(at, dx, dy, eye, uniforms, memory, units, out):
 def shadows(at, dx, dy, eye, uniforms, memory, units, out):
     """Adaptive soft shadows (Uralsky 2005) with bump and gloss maps.
 
-    Attributes: uv, normal, tangent, position, place seen from the light (X, Y in widths of the map at depth 1, depth). Units:
-    colour, bump, gloss, shadow map. uniforms: unit vector to the light, radius of the penumbra in the map, relative
-    bias, near plane of the light. 8 samples on the rim; only where they disagree 56 more, so penumbras alone are dear.
-    Four texels a sample.
+    Attributes: uv, normal, tangent, position, place seen from the light (X, Y in widths of the map at depth 1, depth).
+    Units: colour, bump, gloss, shadow map. uniforms: unit vector to the light, radius of the penumbra in the map,
+    relative bias, near plane of the light. 8 samples on the rim; only where they disagree 56 more, so penumbras alone
+    are dear. Four texels a sample.
     """
     bump, gloss = memory.colors[0], memory.colors[1]
     _filtered(memory, units[0], at, dx, dy, 0, out)
@@ -145,8 +145,8 @@ def shadows(at, dx, dy, eye, uniforms, memory, units, out):
 
 @kernel
 def ocean(at, dx, dy, eye, uniforms, memory, units, out):
-    """Water after Pelzer 2004: four bump look-ups, then reflection and refraction at coordinates that depend on them and
-    on the eye, then foam: seven trilinear look-ups, of which two are dependent.
+    """Water after Pelzer 2004: four bump look-ups, then reflection and refraction at coordinates that depend on them
+    and on the eye, then foam: seven trilinear look-ups, of which two are dependent.
 
     Attributes: place on the water (x, z; world), position (eye space), world height. Units: bump, sky, sea floor, foam.
     uniforms: time, eye height above the water, then world_from_eye rotation (9).
@@ -162,7 +162,11 @@ def ocean(at, dx, dy, eye, uniforms, memory, units, out):
         trilinear(memory, units[0], u, v, dx[0] * scale, dx[1] * scale, dy[0] * scale, dy[1] * scale, bump)
         sx += (2.0 * bump[0] - 1.0) * 0.5
         sz += (2.0 * bump[1] - 1.0) * 0.5
-    trilinear(memory, units[3], at[0] * 0.05, at[1] * 0.05, dx[0] * 0.05, dx[1] * 0.05, dy[0] * 0.05, dy[1] * 0.05, foam)
+    scale = 0.05
+    trilinear(
+        memory, units[3], at[0] * scale, at[1] * scale,
+        dx[0] * scale, dx[1] * scale, dy[0] * scale, dy[1] * scale, foam,
+    )  # fmt: skip
     nx, ny, nz = _unit(-0.35 * sx, 1.0, -0.35 * sz)
     # the incident ray in the world: y up
     ex, ey, ez = at[2] - eye[0], at[3] - eye[1], at[4]

@@ -12,6 +12,7 @@ from .buffers import enter, mark, need, pixel_bit
 from .compiling import inlined, kernel
 from .geometry import evaluate, set_edges
 from .shaders import built_in as shader
+from .state import COUNT
 from .textures import MISSES
 
 REPLACE, ALPHA, ADD, MULTIPLY, ACCUMULATE = range(5)  # Work.blend
@@ -130,7 +131,7 @@ def _shade_fragments(fragments, work, view, memory, target):
     edges = work.edges
     triangle, v = -1, -1
     with_map, with_misses = len(target.how) > 0, len(target.misses) > 0
-    for n in range(fragments.cursor[0]):
+    for n in range(fragments.cursor[COUNT]):
         x, y = fragments.x[n], fragments.y[n]
         if fragments.triangle[n] != triangle or fragments.camera[n] != v:
             triangle, v = np.int64(fragments.triangle[n]), np.int64(fragments.camera[n])

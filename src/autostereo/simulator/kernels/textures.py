@@ -26,7 +26,8 @@ class TextureMemory(NamedTuple):
     texels : ndarray of shape (T, 4), uint8
         Row after row from the top, level after level, texture after texture.
     levels : ndarray of shape (levels of all, 6), int64
-        Per level: first texel, width, height, first line, lines per row of blocks, log2 of (block width · 256 + height).
+        Per level: first texel, width, height, first line, lines per row of blocks, log2 of (block width · 256 +
+        height).
     textures : ndarray of shape (textures, 2), int64
         First level, number of levels.
     cache : Lru

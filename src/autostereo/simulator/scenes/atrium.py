@@ -10,7 +10,7 @@ import numpy as np
 from ...display.rig import Rig
 from ..textures import Texture
 from ..workload import Draw, Workload
-from .building import Builder, light_map, masonry
+from .building import Array, Builder, Points, light_map, masonry
 
 LENGTH, WIDTH, STOREY, AISLE, BAYS = 24.0, 7.0, 4.0, 2.5, 8
 
@@ -47,7 +47,7 @@ def _arch(build: Builder, x: float, y: float, z: float, span: float) -> None:
     """A round arch from this column to the next, as thick as a column."""
     rise = STOREY * 0.3 - 0.1
 
-    def shape(s, t):
+    def shape(s: Array, t: Array) -> Points:
         angle = np.pi * s
         lift = np.where(t < 0.5, np.sin(angle) * rise * 0.95, rise + 0.1)
         thick = 0.25 * np.cos(2 * np.pi * t)

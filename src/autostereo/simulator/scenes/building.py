@@ -12,7 +12,8 @@ from ..textures import Texture
 from ..workload import Draw
 
 Array = NDArray[np.float64]
-Patch = Callable[[Array, Array], tuple[Any, Any, Any]]
+Points = tuple[Any, Any, Any]  # x, y, z
+Patch = Callable[[Array, Array], Points]
 REGIONS = 4  # a light map is cut into 4×4 regions, one for each of a room's surfaces
 
 
@@ -46,7 +47,8 @@ def masonry(size: int, seed: int, courses: int, joint: float = 0.06) -> Texture:
     course = np.floor(v).astype(int)
     u = x / size * courses / 2 + 0.5 * (course % 2)
     stone = np.floor(u).astype(int) % max(1, courses // 2)
-    shade = rng.uniform(0.55, 1.0, (courses, max(1, courses // 2), 1)) * rng.uniform(0.85, 1.0, (courses, courses // 2 or 1, 3))
+    across = max(1, courses // 2)
+    shade = rng.uniform(0.55, 1.0, (courses, across, 1)) * rng.uniform(0.85, 1.0, (courses, across, 3))
     color = shade[course % courses, stone] * rng.uniform(0.5, 0.95, 3)
     grain = noise(size, seed + 1, 0.8).reshape(-1, 1)
     edge = np.minimum(np.minimum(u % 1, 1 - u % 1) * 2, np.minimum(v % 1, 1 - v % 1))
@@ -91,11 +93,13 @@ class Builder:
         attributes = np.concatenate([uv, light], axis=-1).reshape(-1, 4)[faces]
         self.parts.setdefault(texture, []).append((corners, attributes))
 
-    def quad(self, texture: int, origin: ArrayLike, right: ArrayLike, up: ArrayLike, cells: tuple[int, int] = (1, 1)) -> None:
+    def quad(
+        self, texture: int, origin: ArrayLike, right: ArrayLike, up: ArrayLike, cells: tuple[int, int] = (1, 1)
+    ) -> None:
         """A parallelogram; right × up points to its front."""
         o, r, u = (np.asarray(x, np.float64) for x in (origin, right, up))
 
-        def shape(s: Array, t: Array) -> tuple[Any, Any, Any]:
+        def shape(s: Array, t: Array) -> Points:
             points = o + s[..., None] * r + t[..., None] * u
             return points[..., 0], points[..., 1], points[..., 2]
 
@@ -105,7 +109,7 @@ class Builder:
         """An upright column with a swelling, a base and a capital in its profile."""
         x, y, z = np.asarray(foot, np.float64)
 
-        def shape(s: Array, t: Array) -> tuple[Any, Any, Any]:
+        def shape(s: Array, t: Array) -> Points:
             profile = radius * (1 + 0.35 * np.exp(-((t / 0.06) ** 2)) + 0.5 * np.exp(-(((1 - t) / 0.08) ** 2)))
             return x + profile * np.sin(2 * np.pi * s), y + height * t, z + profile * np.cos(2 * np.pi * s)
 
@@ -117,7 +121,7 @@ class Builder:
         along = (b - a) / np.linalg.norm(b - a)
         side = np.cross(along, (0.0, 1.0, 0.0))
 
-        def shape(s: Array, t: Array) -> tuple[Any, Any, Any]:
+        def shape(s: Array, t: Array) -> Points:
             bend = 0.08 * np.sin(4 * np.pi * t)
             p = a + t[..., None] * (b - a) + (radius * np.cos(2 * np.pi * s) + bend)[..., None] * side
             return p[..., 0], p[..., 1] - radius * np.sin(2 * np.pi * s), p[..., 2]

@@ -12,7 +12,7 @@ import numpy as np
 from ...display.rig import Rig
 from ..textures import Texture
 from ..workload import Draw, Workload
-from .building import Builder, light_map, masonry
+from .building import Array, Builder, Points, light_map, masonry
 
 ROOMS, SIDE, HEIGHT = 5, 8.0, 4.0
 DOOR, LINTEL = 2.6, 3.0
@@ -52,7 +52,8 @@ def _room(column: int, row: int) -> tuple[Draw, ...]:
         build.quad(wall, origin + along * side + (0, LINTEL, 0), along * DOOR / s, (0, h - LINTEL, 0))
         inward = np.cross(along / s, (0.0, 1.0, 0.0))
 
-        def arch(u, v, origin=origin, along=along, inward=inward):  # a moulding around the door, finely cut
+        def arch(u: Array, v: Array, origin: Array = origin, along: Array = along, inward: Array = inward) -> Points:
+            # a moulding around the door, finely cut
             angle = np.pi * u
             reach = DOOR / 2 + 0.12 + 0.12 * np.cos(2 * np.pi * v)
             across = 0.5 + reach * -np.cos(angle) / s

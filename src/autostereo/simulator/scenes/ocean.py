@@ -42,5 +42,6 @@ def frame(number: int) -> tuple[Workload, Rig]:
     per_vertex = np.concatenate([points[:, [0, 2]], points, points[:, 1:2]], axis=1)
     corners = points[faces]
     draw = Draw(corners, per_vertex[faces], "ocean", (0, 1, 2, 3), (time, float(position[1])), facing=0)
-    rig = Rig(tuple(position), tuple(position + (0.0, -0.35, -1.0)), fov_y=50.0, focal_distance=9.0, near=0.1, views=1)
+    target = position + np.array([0.0, -0.35, -1.0])
+    rig = Rig(tuple(position), tuple(target), fov_y=50.0, focal_distance=9.0, near=0.1, views=1)
     return Workload((draw,), _textures(), (0.4, 0.6, 0.85), name="ocean"), rig
