@@ -103,7 +103,7 @@ def test_bc1_textures_take_an_eighth_of_the_bandwidth():
         simulate(wall(0.2), RIG, MULTI.with_(texture={"compression": kind}), size=SIZE) for kind in ("none", "bc1")
     )
     assert packed.texture_bytes * 8 == raw.texture_bytes > 0
-    assert packed.psnr(raw).min() > 22  # channels that vary in directions of their own are the worst for a line of colours
+    assert packed.psnr(raw).min() > 22  # channels that vary on their own fit no line of colours
 
 
 def test_approximated_pixels_are_green():

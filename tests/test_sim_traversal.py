@@ -204,3 +204,37 @@ def test_counters_do_not_depend_on_threads():
     together = in_parallel(frames, lambda frame: simulate(*frame, MULTI, size=(64, 48)))
     alone = [simulate(*frame, MULTI, size=(64, 48)) for frame in frames]
     assert [r.as_dict() for r in together] == [r.as_dict() for r in alone]
+
+
+# --- what the method rests on, with plain NumPy ---------------------------------------------------------------------------
+def barycentric(corners: np.ndarray, x: np.ndarray, y: float, v: float) -> tuple[np.ndarray, np.ndarray]:
+    """Perspective-correct weights (n, 3) and depths (n,) of a row's samples, by solving for them; f = 100, focal 4."""
+    rays = np.stack([x / 100 - v / 4, np.full_like(x, y / 100), np.ones_like(x)])
+    weights = np.linalg.solve((corners - (v, 0, 0)).T, rays).T
+    return weights / weights.sum(axis=1, keepdims=True), 1 / weights.sum(axis=1)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_traversal_directions_are_the_same_in_all_views(seed):
+    """Section 4.1: the samples of a row lie on one line of barycentric space, in every view."""
+    rng = np.random.default_rng(seed)
+    corners = rng.uniform((-2, -2, 2), (2, 2, 9), (3, 3))
+    pbs = [barycentric(corners, np.arange(-30.0, 30), 7.0, v)[0][:, 1:] for v in (-1.0, 0.0, 0.7)]
+    points = np.concatenate(pbs)
+    near = points[np.abs(points).max(axis=1) < 100]
+    spread = np.linalg.svd(near - near.mean(axis=0), compute_uv=False)
+    assert spread[1] < 1e-9 * spread[0]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_equation_5_is_a_shift_by_parallax(seed):
+    """Interpolating the exact view's homogeneous corners by the approximated view's weights: x slides, y stays."""
+    rng = np.random.default_rng(seed)
+    corners = rng.uniform((-2, -2, 2), (2, 2, 9), (3, 3))
+    x, a, e = np.arange(-30.0, 30), -0.4, 0.9
+    weights, depth = barycentric(corners, x, 7.0, a)
+    d = corners[:, 2]
+    homogeneous = np.stack([100 * (corners[:, 0] + e * (d / 4 - 1)), 100 * corners[:, 1], d], axis=1)
+    c = weights @ homogeneous
+    np.testing.assert_allclose(c[:, 0] / c[:, 2], x + 100 * (e - a) * (1 / 4 - 1 / depth), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(c[:, 1] / c[:, 2], 7.0, rtol=1e-9)

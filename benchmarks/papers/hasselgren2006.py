@@ -13,6 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import autostereo as aus
 from autostereo.simulator import Machine, Workload
 from autostereo.simulator.scenes import SCENES
@@ -121,21 +123,19 @@ def orders(frames: range) -> Rows:
 
 
 def mesh(path: Path) -> Rows:
-    """A real game level, from seven places on a circle around its middle."""
-    workload = Workload.of(aus.load(path), path.stem)
-    low, high = aus.load(path).bounds
-    middle, reach = (low + high) / 2, float((high - low).max())
+    """A real game level, from the middle of its triangles in six directions."""
+    scene = aus.load(path)
+    workload = Workload.of(scene, path.stem)
+    middle = np.median(np.concatenate([draw.corners.mean(axis=1) for draw in workload.draws]), axis=0)
+    unit = float(np.ptp(scene.bounds, axis=0).max()) / 2000  # some 12 cm of a level of 250 m
 
     def at(number: int, views: int) -> tuple[Workload, aus.Rig]:
-        import numpy as np
+        angle = 2 * np.pi * number / 6
+        target = middle + 50 * unit * np.array([np.sin(angle), -0.05, np.cos(angle)])
+        wide = 0.5 * unit * (views - 1)
+        return workload, aus.Rig(tuple(middle), tuple(target), fov_y=60.0, near=unit, views=views, baseline=wide)
 
-        angle = 2 * np.pi * number / 7
-        position = middle + reach * np.array([0.12 * np.sin(angle), 0.0, 0.12 * np.cos(angle)])
-        target = position + reach * np.array([0.1 * np.cos(angle), -0.01, -0.1 * np.sin(angle)])
-        wide = 0.0006 * reach * (views - 1)
-        return workload, aus.Rig(position, target, fov_y=60.0, near=0.001 * reach, views=views, baseline=wide)
-
-    rows = Study(path.stem, at, [TX, TRI, OURS, APPROXIMATE], (1, 4, 16), range(7)).run()
+    rows = Study(path.stem, at, [TX, TRI, OURS, APPROXIMATE], (1, 4, 16), range(6)).run()
     for row in rows:
         print(line(row), flush=True)
     return rows
