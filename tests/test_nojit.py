@@ -219,7 +219,8 @@ def test_gathering_is_that_of_the_reference(display, flips):
 
 
 @pytest.mark.parametrize("change", [
-    {}, {"shading": {"approximate": True, "filter": "tent"}}, {"shading": {"approximate": True, "source": "color-buffer"}},
+    {}, {"shading": {"approximate": True, "filter": "tent"}},
+    {"shading": {"approximate": True, "source": "color-buffer"}},
     {"traversal": {"order": "by-view"}, "depth": {"z_min": True}}, {"traversal": {"tile": (1, 1)}},
 ])  # fmt: skip
 def test_the_simulator_stays_in_bounds(change):

@@ -206,7 +206,7 @@ def test_counters_do_not_depend_on_threads():
     assert [r.as_dict() for r in together] == [r.as_dict() for r in alone]
 
 
-# --- what the method rests on, with plain NumPy ---------------------------------------------------------------------------
+# --- what the method rests on, with plain NumPy -----------------------------------------------------------------------
 def barycentric(corners: np.ndarray, x: np.ndarray, y: float, v: float) -> tuple[np.ndarray, np.ndarray]:
     """Perspective-correct weights (n, 3) and depths (n,) of a row's samples, by solving for them; f = 100, focal 4."""
     rays = np.stack([x / 100 - v / 4, np.full_like(x, y / 100), np.ones_like(x)])
