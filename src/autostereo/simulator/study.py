@@ -82,7 +82,10 @@ def figures_of(report: Report, machine: Machine, seconds: float, quality: Any = 
     counters = report.counters
     approximated_views = report.approximated > 0
     share = report.share_approximated[approximated_views]
-    finite = quality[np.isfinite(quality)] if quality is not None else np.empty(0)
+    finite = np.empty(0)
+    if quality is not None:  # of what is approximated; without that, of all views that a unified camera changes
+        chosen = quality[approximated_views] if approximated_views.any() else quality
+        finite = chosen[np.isfinite(chosen)]
     return {
         "machine": machine.name, "scene": report.scene, "views": report.views, "size": list(report.size),
         "texture": report.texture_bytes, "depth": report.depth_bytes, "color": report.color_bytes,

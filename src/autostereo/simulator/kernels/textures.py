@@ -87,8 +87,16 @@ def _wrap(i, n):
 
 
 @inlined
-def add_bilinear(memory, number, u, v, share, out):
-    """Add `share` times the bilinear colour of a level at (u, v) to out (4,)."""
+def _mix(texels, a, b, c, d, k, s, t):
+    """Channel k of four texels, bilinearly."""
+    below = (1.0 - s) * texels[a, k] + s * texels[b, k]
+    above = (1.0 - s) * texels[c, k] + s * texels[d, k]
+    return (1.0 - t) * below + t * above
+
+
+@inlined
+def _bilinear(memory, number, u, v):
+    """The four channels 0…255 of a level at (u, v)."""
     w, h = memory.levels[number, 1], memory.levels[number, 2]
     x = (u - math.floor(u)) * w - 0.5
     y = (v - math.floor(v)) * h - 0.5
@@ -101,10 +109,10 @@ def add_bilinear(memory, number, u, v, share, out):
     texels, start = memory.texels, memory.levels[number, 0]
     a, b = start + r0 * w + x0, start + r0 * w + x1
     c, d = start + r1 * w + x0, start + r1 * w + x1
-    for k in range(4):
-        below = (1.0 - s) * texels[a, k] + s * texels[b, k]
-        above = (1.0 - s) * texels[c, k] + s * texels[d, k]
-        out[k] += share * ((1.0 - t) * below + t * above)
+    return (
+        _mix(texels, a, b, c, d, 0, s, t), _mix(texels, a, b, c, d, 1, s, t),
+        _mix(texels, a, b, c, d, 2, s, t), _mix(texels, a, b, c, d, 3, s, t),
+    )  # fmt: skip
 
 
 @inlined
@@ -121,11 +129,13 @@ def trilinear(memory, texture, u, v, dudx, dvdx, dudy, dvdy, out):
     lower = np.int64(detail)
     fraction = detail - lower
     memory.counts[LOOKUPS] += 1
-    for k in range(4):
-        out[k] = 0.0
-    add_bilinear(memory, first + lower, u, v, (1.0 - fraction) / 255.0, out)
+    red, green, blue, alpha = _bilinear(memory, first + lower, u, v)
     if fraction > 0.0:
-        add_bilinear(memory, first + lower + 1, u, v, fraction / 255.0, out)
+        near = 1.0 - fraction
+        r, g, b, a = _bilinear(memory, first + lower + 1, u, v)
+        red, green = near * red + fraction * r, near * green + fraction * g
+        blue, alpha = near * blue + fraction * b, near * alpha + fraction * a
+    out[0], out[1], out[2], out[3] = red / 255.0, green / 255.0, blue / 255.0, alpha / 255.0
 
 
 @inlined
