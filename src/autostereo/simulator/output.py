@@ -30,7 +30,7 @@ def show(rows: Rows) -> None:
     width, height = rows[0]["size"]
     table = Table(title=f"{rows[0]['scene']}, {width}×{height} a view, MB a frame (mean of {rows[0]['frames']})")
     for name in ("views", "machine", "texture", "of first", "least … greatest", "depth", "colour", "total", "of first",
-                 "bytes/texel·4", "shader runs, M", "approximated", "PSNR (least), dB", "Mtexel/s"):  # fmt: skip
+                 "m", "shader runs, M", "approximated", "PSNR (least), dB", "Mtexel/s"):  # fmt: skip
         table.add_column(name, justify="left" if name == "machine" else "right")
     for row in rows:
         first = next(r for r in rows if r["views"] == row["views"])
@@ -44,7 +44,8 @@ def show(rows: Rows) -> None:
             f"{row['texels_per_second'] / 1e6:.0f}",
         )  # fmt: skip
     console.print(table)
-    console.print(_model_table(rows))
+    if "model" in rows[0]:
+        console.print(_model_table(rows))
 
 
 def _share(value: float, base: float) -> str:
