@@ -20,6 +20,7 @@ MAX_PARAMETERS = 6
 CONTRACT = {"lenticular", "slanted", "from_table", "from_calibration", "wavelength_selective", "stereo", "physical"}
 ROOMS = {
     "engines/cpu": "Numba kernels take arrays one by one; structures would defeat SIMD",
+    "simulator/kernels": "the small steps of an inner loop take what they compute with as scalars",
     "cli": "the parameters of a verb are the options that a user types",
 }
 

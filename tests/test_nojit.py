@@ -216,3 +216,18 @@ def test_gathering_is_that_of_the_reference(display, flips):
         np.testing.assert_array_equal(
             seen, reference.observe(expected, display.viewmap, wanted, crosstalk=crosstalk, flips=flips)
         )
+
+
+@pytest.mark.parametrize("change", [
+    {}, {"shading": {"approximate": True, "filter": "tent"}},
+    {"shading": {"approximate": True, "source": "color-buffer"}},
+    {"traversal": {"order": "by-view"}, "depth": {"z_min": True}}, {"traversal": {"tile": (1, 1)}},
+])  # fmt: skip
+def test_the_simulator_stays_in_bounds(change):
+    from autostereo.simulator import simulate
+    from sim_scenes import MULTI, layers
+
+    exact = simulate(layers(), RIG, MULTI, size=SIZE)
+    found = simulate(layers(), RIG, MULTI.with_(**change), size=SIZE, maps=True)
+    np.testing.assert_array_equal(found.depth, exact.depth)
+    assert found.counters["texels"] > 0

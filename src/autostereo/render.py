@@ -20,6 +20,7 @@ from .engines.engine import Camera, Draw, Target, get_engine
 from .engines.options import Options
 from .errors import InputError, MemoryLimitError, UnsupportedError
 from .frame import Panel, ViewStack
+from .methods import depth_of_field
 from .scene.scene import Scene
 from .scene.transfer import TransferFunction
 from .scene.volume import Volume
@@ -99,6 +100,8 @@ class Renderer:
         if not isinstance(display, Display):
             raise InputError(f"display: expected a Display, such as Display.preset('…'), got {type(display).__name__}")
         options = options or Options()
+        if options.aperture:
+            raise UnsupportedError("options aperture: depth of field is drawn into views, not into panels")
         schedule = methods.get_method(method, self.engine)
         rig = (rig or Rig.frame(self.scene, display)).with_views(display.views)
         if display.viewmap is None:
@@ -139,7 +142,10 @@ class Renderer:
         if options.depth:
             target.depth = self._array("depth", None, shape, np.float32)
         draw = Draw(camera, offsets, culling_range(rig), options=options, method=method)
-        schedule.draw_views(self.engine, self._prepared, draw, target)
+        if options.aperture:
+            depth_of_field.draw_views(schedule, self.engine, self._prepared, draw, target)
+        else:
+            schedule.draw_views(self.engine, self._prepared, draw, target)
         return ViewStack(target.color, target.depth, share(target, options))
 
     def update(self, transform: Any = None, transfer: Any = None) -> None:

@@ -23,11 +23,12 @@ from .observe import observe
 from .pattern import pattern
 from .quilt import quilt
 from .render import render
+from .simulate import simulate
 from .views import views
 from .weave import weave
 
 VERBS: tuple[Callable[..., None], ...] = (
-    render, quilt, views, weave, observe, pattern, displays, info, demo, bench
+    render, quilt, views, weave, observe, pattern, displays, info, demo, bench, simulate
 )  # fmt: skip
 
 app = typer.Typer(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -31,6 +32,12 @@ def views(
     lighting: common.Lighting = "sample",
     samples: common.Samples = 1,
     depth: Annotated[bool, typer.Option("--depth", help="Also keep eye depth (.npz only).")] = False,
+    lens: Annotated[
+        str | None, typer.Option("--depth-of-field", metavar="NxM", help="Through a lens of so many samples.")
+    ] = None,
+    aperture: Annotated[
+        float | None, typer.Option("--aperture", help="Side of the square lens; 1/50 of the focal distance.")
+    ] = None,
     shape: common.Shape = None,
     dtype: common.VoxelType = None,
     frame: common.Frame = None,
@@ -52,6 +59,7 @@ def views(
       autostereo views bunny.ply -o bunny.webp -d looking-glass-portrait --size 420x560
       autostereo views bunny.ply -o bunny.npz --depth --camera rig.json
       autostereo views head.nrrd -o head.webp --mode mip
+      autostereo views bunny.ply -o bunny/ --views 2 --depth-of-field 8x8
     """
     suffix = output.suffix.lower()
     pixels = common.parse_size(size) if size else (512, 512)
@@ -59,6 +67,11 @@ def views(
         raise InputError(f"{output}: expected a folder, or a name ending in .npz {' '.join(ANIMATIONS)}, got {suffix}")
     if depth and suffix != ".npz":
         raise InputError("--depth: only a .npz file can hold it")
+    if aperture is not None and (lens is None or not aperture > 0):
+        raise InputError(f"--aperture: expected a number > 0 beside --depth-of-field NxM, got {aperture:g}")
+    samples_of_lens = common.parse_pair(lens, "--depth-of-field", 64) if lens else (1, 1)
+    if depth and lens:
+        raise InputError("--depth: means through a lens have no one depth, leave out --depth-of-field")
     from ..engines.options import Options
 
     common.check_views(views)
@@ -73,6 +86,8 @@ def views(
     common.check_output(output, (suffix,) if suffix else ())
     scene = common.load_scene(inputs, background, volumes)
     rig = common.frame_views(scene, rig, views, pixels, display, side)
+    if lens is not None:
+        options = replace(options, aperture=rig.focal / 50 if aperture is None else aperture, lens=samples_of_lens)
 
     from ..engines.cpu.kernels import kernels_for
     from ..render import render_views

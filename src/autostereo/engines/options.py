@@ -47,6 +47,10 @@ class Options:
         Points by `covering-quad` on the OpenGL engine with an `alpha` that is not "exact": drawn once, in so many
         groups that each keep the nearest (Hübner 2007b, section 3.5.2). More lose fewer points; each costs a tile of
         memory the size of the panel, and time to blend it.
+    aperture : float
+        Views: side of a square lens, world units; 0 is a pinhole. What lies in the focal plane is in focus.
+    lens : (int, int)
+        Samples of that lens, columns and rows, 1 … 64.
     proxy : {"march", "slices"}
         Volumes on the OpenGL engine: a ray march, or view-aligned slices blended back to front (Hübner 2007a).
     """
@@ -62,6 +66,8 @@ class Options:
     views_per_pass: int | None = None
     groups: int = 8
     proxy: str = "march"
+    aperture: float = 0.0
+    lens: tuple[int, int] = (4, 4)
 
     def __post_init__(self) -> None:
         for name, choices in CHOICES.items():
@@ -71,6 +77,15 @@ class Options:
                 raise InputError(f"options {name}: expected one of {wanted}, got {value!r}")
         if isinstance(self.step, bool) or not isinstance(self.step, (int, float)) or not 0 < self.step < 1e6:
             raise InputError(f"options step: expected a number > 0, got {self.step!r}")
+        aperture = self.aperture
+        if isinstance(aperture, bool) or not isinstance(aperture, (int, float)) or not 0 <= aperture < 1e30:
+            raise InputError(f"options aperture: expected a number ≥ 0, got {aperture!r}")
+        lens = self.lens
+        whole = isinstance(lens, tuple) and len(lens) == 2 and all(type(n) is int and 1 <= n <= 64 for n in lens)
+        if not whole:
+            raise InputError(f"options lens: expected two whole numbers from 1 to 64, got {lens!r}")
+        if aperture and self.depth:
+            raise InputError("options depth: means through a lens of some aperture have no one depth")
         for name in ("views_per_pass", "groups"):
             value = getattr(self, name)
             if name == "views_per_pass" and value is None:

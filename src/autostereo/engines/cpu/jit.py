@@ -1,77 +1,12 @@
-"""One decorator for every kernel, and the cache of compiled kernels.
-
-Numba's own cache does not notice an edit in a jitted callee of another file. Here the cache folder is keyed
-by the sources of the whole engine, so that kernels may live in several files and never go stale.
-"""
+"""The decorators for the cpu engine's kernels, and their cache (`autostereo.jit`)."""
 
 from __future__ import annotations
 
-import hashlib
-import os
-import sys
-import tempfile
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
-import numba
-from numba import config, njit
-
+from ...jit import Kernels
 from . import simd_compiled  # noqa: F401  (kernels may use the vectors of `simd`)
 
-
-def _key() -> str:
-    """Digest of this engine's sources, where they lie (Numba's cache asks), Numba's version and Python's."""
-    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:3]} {Path(__file__).parent}".encode())
-    for source in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(source.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def _cache_folder() -> Path | None:
-    """First writable place for the cache: NUMBA_CACHE_DIR, the user's cache, the temporary folder; or None."""
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
-    user = os.getuid() if hasattr(os, "getuid") else "user"
-    for base in (config.CACHE_DIR, home / "autostereo", Path(tempfile.gettempdir()) / f"autostereo-{user}"):
-        if not base:
-            continue
-        folder = Path(base) / f"kernels-{_key()}"
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError:
-            continue
-        if os.access(folder, os.W_OK):
-            return folder
-    return None
-
-
-CACHE = _cache_folder()
-
-
-def _compile(function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
-    before = config.CACHE_DIR
-    try:
-        config.CACHE_DIR = str(CACHE or "")
-        return njit(nogil=True, cache=CACHE is not None, error_model="numpy", **options)(function)
-    finally:
-        config.CACHE_DIR = before
-
-
-def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile `function`: no GIL, cached, C-like division, never fastmath (kernels must agree bit for bit)."""
-    return _compile(function)
-
-
-def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile `function` into its callers: for the small steps of an inner loop.
-
-    Without reference counting (`_nrt`): it neither makes nor keeps arrays, and atomic counts cost as much as a pixel.
-    """
-    return _compile(function, forceinline=True, _nrt=False)
-
-
-def is_compiled(*names: str) -> bool:
-    """True when the cache holds this version's kernels whose names begin so: what uses them starts at once."""
-    if config.DISABLE_JIT:
-        return True
-    return CACHE is not None and all(any(CACHE.rglob(f"*.{name}*.nbc")) for name in names)
+_kernels = Kernels(Path(__file__).parent)
+CACHE = _kernels.cache
+kernel, inlined, is_compiled = _kernels.kernel, _kernels.inlined, _kernels.is_compiled

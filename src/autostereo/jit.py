@@ -1,0 +1,86 @@
+"""Compiling kernels, and the cache of compiled kernels: one `Kernels` for each folder of them.
+
+Numba's own cache does not notice an edit in a jitted callee of another file. Here the cache folder is keyed
+by the sources of the whole folder, so that kernels may live in several files and never go stale.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba import config, njit
+
+
+class Kernels:
+    """The decorators for the kernels of one folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the sources lie; every `*.py` in it is part of the key.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.cache = _cache_folder(_key(folder))
+
+    def kernel(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Compile `function`: no GIL, cached, C-like division, never fastmath (kernels must agree bit for bit)."""
+        return self._compile(function)
+
+    def inlined(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Compile `function` into its callers: for the small steps of an inner loop.
+
+        Without reference counting (`_nrt`): it neither makes nor keeps arrays, and atomic counts cost as much as a
+        pixel.
+        """
+        return self._compile(function, forceinline=True, _nrt=False)
+
+    def lean(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Compile `function` without reference counting, as `inlined`, but as a function that is called."""
+        return self._compile(function, _nrt=False)
+
+    def is_compiled(self, *names: str) -> bool:
+        """True when the cache holds the kernels whose names begin so: what uses them starts at once."""
+        if config.DISABLE_JIT:
+            return True
+        return self.cache is not None and all(any(self.cache.rglob(f"*.{name}*.nbc")) for name in names)
+
+    def _compile(self, function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
+        before = config.CACHE_DIR
+        try:
+            config.CACHE_DIR = str(self.cache or "")
+            return njit(nogil=True, cache=self.cache is not None, error_model="numpy", **options)(function)
+        finally:
+            config.CACHE_DIR = before
+
+
+def _key(folder: Path) -> str:
+    """Digest of the folder's sources, where they lie (Numba's cache asks), Numba's version and Python's."""
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:3]} {folder}".encode())
+    for source in sorted(folder.glob("*.py")):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _cache_folder(key: str) -> Path | None:
+    """First writable place for the cache: NUMBA_CACHE_DIR, the user's cache, the temporary folder; or None."""
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
+    user = os.getuid() if hasattr(os, "getuid") else "user"
+    for base in (config.CACHE_DIR, home / "autostereo", Path(tempfile.gettempdir()) / f"autostereo-{user}"):
+        if not base:
+            continue
+        folder = Path(base) / f"kernels-{key}"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(folder, os.W_OK):
+            return folder
+    return None

@@ -1,0 +1,1 @@
+"""The machine's inner loops, compiled by Numba; each steps through one stage of the pipeline."""
