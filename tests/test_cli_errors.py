@@ -262,6 +262,11 @@ def test_interrupt_while_writing_leaves_nothing(cli: Run, folder: Path, monkeypa
     assert {path.name for path in folder.iterdir()} == {"square.off"}
 
 
+def heed_signals() -> None:
+    """Undo what a shell does to the jobs that it starts in the background: SIGINT is ignored there."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_signal_in_the_middle(folder: Path, number: signal.Signals) -> None:
     """A process that is stopped while it renders exits with 128 + signal, says at most one line, and leaves nothing."""
@@ -272,14 +277,16 @@ def test_signal_in_the_middle(folder: Path, number: signal.Signals) -> None:
         "from autostereo.cli import main\n"
         "sys.argv = ['autostereo', 'views', 'square.off', '-o', 'out']\nmain()\n"
     )
-    process = subprocess.Popen(
-        [sys.executable, "-c", code], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    assert process.stdout is not None
-    assert process.stdout.readline() == "started\n"
-    time.sleep(0.1)
-    process.send_signal(number)
-    _, err = process.communicate(timeout=30)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen([sys.executable, "-c", code], cwd=folder, preexec_fn=heed_signals, **pipes) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "started\n"
+        time.sleep(0.1)
+        process.send_signal(number)
+        try:
+            _, err = process.communicate(timeout=30)
+        finally:
+            process.kill()
     assert process.returncode == 128 + number
     assert "Traceback" not in err and len(err.strip().splitlines()) <= 1
     assert {path.name for path in folder.iterdir()} == {"square.off"}
