@@ -95,6 +95,11 @@ def ceil(a):
     return np.ceil(a)
 
 
+def fused(a, b, c):
+    """a·b + c, rounded once where the processor can, so not the same bits everywhere: for what need not be."""
+    return a * b + c
+
+
 def sqrt(a):
     """Square root."""
     return np.sqrt(a)

@@ -282,6 +282,12 @@ def _emit_call(name: str) -> Callable[..., Any]:
     return emit
 
 
+def _emit_fused(context, builder, sig, args):
+    a, b, c = (_widen(builder, value, t) for value, t in zip(args, sig.args, strict=True))
+    kind = ir.FunctionType(a.type, [a.type] * 3)
+    return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.fmuladd.v{LANES}f32"), [a, b, c])
+
+
 def _emit_choice(sign: str) -> Callable[..., Any]:
     def emit(context, builder, sig, args):
         a, b = (_widen(builder, value, t) for value, t in zip(args, sig.args, strict=True))
@@ -344,6 +350,7 @@ _function(simd.iota, lambda: I32, lambda c, b, s, a: ir.Constant(_LLVM[I32], lis
 _function(simd.select, lambda mask, a, b: _both(a, b) if mask is MASK else None, _emit_select)
 _function(simd.lesser, lambda a, b: _both(a, b), _emit_choice("<"))
 _function(simd.greater, lambda a, b: _both(a, b), _emit_choice(">"))
+_function(simd.fused, lambda a, b, c: F32 if a is b is c is F32 else None, _emit_fused)
 for _name, _call in (("floor", simd.floor), ("ceil", simd.ceil), ("sqrt", simd.sqrt)):
     _function(_call, lambda a: F32 if a is F32 else None, _emit_call(_name))
 _function(simd.to_int, lambda a: I32 if a is F32 else None, lambda c, b, s, a: b.fptosi(a[0], _LLVM[I32]))

@@ -241,7 +241,9 @@ def new_shared(camera: Camera, slices: Slices, offsets: NDArray[np.float64], fin
     """One thread's memory for shared slabs that reach as far as the views see."""
     begin, count = shared_reach(camera, slices, offsets, fine, phases)
     values = np.zeros(SLABS * phases * SLAB_ROWS * LINE, np.float32)
-    return Shared(begin, fine, phases, count, values, np.zeros((SLABS, count // SPAN), np.uint8))
+    shown = np.zeros((SLABS, count // SPAN + 1), np.uint8)  # one more: pixels are drawn in whole SIMD steps
+    places, parts = np.zeros((SLABS, 3), np.int64), np.zeros(SLABS, np.float32)
+    return Shared(begin, fine, phases, count, values, shown, places, parts)
 
 
 def _draw_shared(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .jit import inlined, kernel
+from .jit import inlined, lean
 from .volume_rays import (
     BACK,
     FRONT,
@@ -47,7 +47,7 @@ def sample_ends(n, base, k, fresh, cut, row, slices, planes, rays):
     trim_ends(n, base, cut, row, depth, slices.distance, rays)
 
 
-@kernel
+@lean
 def march_mip(n, base, cut, row, slices, first, last, planes, rays):
     """Keep the greatest scalar (as a row of the table) of slabs first … last in R, −1 so far, and its depth in HALF."""
     bounds, fresh = block_bounds(n, base, rays), False
@@ -91,7 +91,7 @@ def resolve_mip(n, base, colors, rays):
             rays[base + HALF + i] = np.float32(np.inf)
 
 
-@kernel
+@lean
 def march_iso(n, base, cut, row, slices, first, last, level, planes, rays):
     """Find in which slab of first … last a ray first crosses `level`, a row of the table; HALF becomes its depth."""
     bounds, fresh, iso = block_bounds(n, base, rays), False, np.float32(level)
@@ -180,7 +180,7 @@ def refine_hit(cut, row, origin, turn, depth, near, far, level):
     return d
 
 
-@kernel
+@lean
 def resolve_iso(n, base, cut, row, slices, level, color, material, shade, own_eyes, rays):
     """Refine the hits of rays, and shade them: Blinn–Phong, the normal turned to the viewer."""
     m = cut.from_eye

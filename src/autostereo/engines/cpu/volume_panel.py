@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from .jit import inlined, kernel
+from .jit import inlined, kernel, lean
 from .panel_lines import row_offsets
-from .volume_rays import END, HALF, LENGTH, ONE, ORIGIN, RAYS, ROW, TURN, ZERO, B, G, R, T
+from .volume_rays import END, HALF, HIDDEN, LENGTH, ONE, ORIGIN, RAYS, ROW, TURN, ZERO, B, G, R, T
 from .volume_sample import SLABS, hide_runs, keep_alive, mark_runs
 from .volume_shared import ALPHA, LINE, SLAB_ROWS, SPAN, classify_slabs, shift_of
-from .volume_views import HIDDEN, PIXELS, mark_volumes, next_slices, over, trace_rays
+from .volume_views import PIXELS, mark_volumes, next_slices, over, trace_rays
 
 AT, MOVE, SHARE_R, CUT_R, A0, A1, C0, C1, SUM, THROUGH = (np.uint64(k * ROW) for k in range(10))
 PIXEL_ROWS = 10
@@ -37,7 +37,7 @@ def fetch_pixels(n, base, slab, channel, last, values, pixels, index):
         pixels[base + C0 + i] += part * (pixels[base + C1 + i] - pixels[base + C0 + i])
 
 
-@kernel
+@lean
 def blend_pixels(blocks, averaged, camera, slices, first, last, shared, pixels, index):
     """Add slabs first … last to the sub-pixels of a row, in blocks of 64 for each channel, each at its own place."""
     n = np.uint64(RAYS)
@@ -91,7 +91,7 @@ def place_in_pixel(subpixel, c):
     return (c - 1) / 3.0 if subpixel else 0.0
 
 
-@kernel
+@lean
 def hide_behind_panel(width, offsets, camera, cut, slices, k, last, planes, pixels):
     """Leave out what all sub-pixels have seen enough before, in the slices of slabs k … last."""
     near, far = slices.first + k * slices.distance, slices.first + last * slices.distance

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .jit import inlined, kernel
+from .jit import inlined, lean
 from .scalars import exp2_fast, log2_fast, whole_steps
 from .volume_sample import (
     AT,
@@ -35,6 +35,7 @@ BLOCK_ROWS = 27
 ZERO, ONE, HALF_WAY = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 TEN_BITS, COLOR_STEP = np.int32(1023), np.float32(1.0 / 1023.0)
 OPAQUE = 128  # transmittance in 65536ths, below which a ray has seen enough
+HIDDEN = np.float32(OPAQUE / 65536.0)
 
 
 @inlined
@@ -97,7 +98,7 @@ def sample_grid(n, base, depth, cut, values, scalar, rays, index):
     sample_rays(n, base, values, scalar, rays, index)
 
 
-@kernel
+@lean
 def sample_volume(n, base, depth, cut, row, planes, scalar, rays):
     """Scalars of the volume itself where rays cross a depth, into row `scalar`."""
     lists, d = planes.lists, np.float32(depth)
@@ -108,7 +109,7 @@ def sample_volume(n, base, depth, cut, row, planes, scalar, rays):
         rays[base + scalar + i] = lists[VALUE + i]
 
 
-@kernel
+@lean
 def light_slab(n, base, middle, cut, row, own_eyes, planes, rays):
     """Light at the middle of a slab into LIT, on rays that see it: SHARE is its opacity. Returns whether any does."""
     lists, chosen, d, own = planes.lists, planes.chosen, np.float32(middle), ONE if own_eyes else ZERO
@@ -301,7 +302,7 @@ def is_seen(n, base, cut, slices, k, planes, rays):
     )
 
 
-@kernel
+@lean
 def add_optical(n, base, cut, row, slices, k, way, planes, rays, packed):
     """Add the optical depth of slab k of one of several volumes to TOTAL."""
     depth = slices.first + k * slices.distance
@@ -327,7 +328,7 @@ def part_of_total(n, base, rays):
         rays[base + DONE + i] += part
 
 
-@kernel
+@lean
 def march(n, base, cut, row, slices, first, last, way, wants_half, among, planes, rays, packed):
     """Take a block of rays through slabs first … last; way: see volume_views.Ways.
 

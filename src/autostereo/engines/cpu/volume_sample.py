@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .jit import inlined, kernel
+from .jit import inlined, lean
 from .scalars import exp2_fast, log2_fast
 from .volume_setup import BLOCK, TABLE
 
@@ -88,7 +88,7 @@ def on_slice(cut, row, depth):
     )
 
 
-@kernel
+@lean
 def mark_runs(cut, row, slices, marks, wanted):
     """Mark the runs of every slice in which a block shows something, and those and their neighbours as wanted.
 
@@ -280,7 +280,7 @@ def light_points(n, cut, y, depth, start, place, words, lists):
     light_samples(n, cut, y, depth, lists)
 
 
-@kernel
+@lean
 def sample_slice(cut, row, slices, k, planes, into):
     """Sample slice k into planes.values[into]; unwanted runs get the scalar of their middle."""
     runs = planes.wanted.shape[1]
@@ -330,7 +330,7 @@ def keep_alive(low, high, cut, alive):
         alive[c] = np.uint8(1)
 
 
-@kernel
+@lean
 def hide_runs(first, last, planes):
     """Leave out runs of slices first … last that are hidden: those that are not alive."""
     for k in range(first, last + 1):

@@ -15,12 +15,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .jit import inlined, kernel
-from .scalars import exp2_fast, log2_fast, whole_steps
+from .jit import inlined, lean
+from .scalars import exp2_fast, log2_fast
+from .simd import LANES, fused, load, mask_word, splat, store
 from .volume_rays import (
     BACK,
     END,
     FRONT,
+    HIDDEN,
     LENGTH,
     ONE,
     OPTICAL,
@@ -48,6 +50,7 @@ MAX_LENGTH = 16384  # positions of a phase
 LINE = MAX_LENGTH + 80  # room for the positions of one phase, a constant so that rows are known not to overlap
 RED, GREEN, BLUE, ALPHA = (np.uint64(k * LINE) for k in range(4))
 SLAB_ROWS = 4
+POSITION, NEAR, BESIDE = 0, 1, 2
 SPAN = 32  # positions of a phase of which it is known whether something is seen
 
 
@@ -56,7 +59,8 @@ class Shared(NamedTuple):
 
     begin: x of position 0; fine, phases: see above; length: positions of a phase, in whole blocks; values
     (SLABS · phases · 4 · LINE,) float32: colour times opacity, and opacity; shown (SLABS, length / SPAN) uint8: in
-    which spans something is seen; the others are zero.
+    which spans something is seen; the others are zero; places (SLABS, 3) int64, parts (SLABS,) float32: of pixel 0 of a
+    view, its position, where its left and right neighbours are kept, and how far it is from the left one to the right.
     """
 
     begin: float
@@ -65,6 +69,8 @@ class Shared(NamedTuple):
     length: int
     values: np.ndarray
     shown: np.ndarray
+    places: np.ndarray
+    parts: np.ndarray
 
 
 @inlined
@@ -99,7 +105,7 @@ def note_shown(base, shown, slab, group, rays):
             shown[slab, group * (RAYS // SPAN) + part] = np.uint8(1)
 
 
-@kernel
+@lean
 def classify_slabs(cut, camera, row, slices, first, last, table, material, light, planes, shared, rays, packed):
     """Fill shared.values with slabs first … last, whose slices are in planes.values from 0 on."""
     far = slices.first + slices.slabs * slices.distance
@@ -153,64 +159,76 @@ def classify_slabs(cut, camera, row, slices, first, last, table, material, light
 
 
 @inlined
-def next_run(shared, k, j):
-    """The next stretch of shown positions of slab k from j on: (first, end); first = length when there is none."""
-    spans = shared.length // SPAN
-    g = j // SPAN
-    while g < spans and shared.shown[k, g] == 0:
-        g += 1
-    begin = g
-    while g < spans and shared.shown[k, g] != 0:
-        g += 1
-    return begin * SPAN, g * SPAN
+def between(near, beside, part, values):
+    """Eight positions of a slab, interpolated between two neighbours."""
+    left = load(values, near)
+    return fused(part, load(values, beside) - left, left)
 
 
 @inlined
-def blend_run(n, near, beside, part, t, values, line):
-    """Add n positions of a slab to a view's pixels; near, beside: places of the left and right neighbours."""
-    for i in range(n):
-        r, g, b, a = values[near + RED + i], values[near + GREEN + i], values[near + BLUE + i], values[near + ALPHA + i]
-        r += part * (values[beside + RED + i] - r)
-        g += part * (values[beside + GREEN + i] - g)
-        b += part * (values[beside + BLUE + i] - b)
-        a += part * (values[beside + ALPHA + i] - a)
-        through = line[t + ALPHA + i]
-        line[t + RED + i] += through * r
-        line[t + GREEN + i] += through * g
-        line[t + BLUE + i] += through * b
-        line[t + ALPHA + i] = through - through * a
+def add_positions(near, beside, part, values, sums):
+    """Add eight positions of a slab, between two neighbours, to the sums (red, green, blue, transmittance)."""
+    through = sums[3]
+    red = fused(through, between(near + RED, beside + RED, part, values), sums[0])
+    green = fused(through, between(near + GREEN, beside + GREEN, part, values), sums[1])
+    blue = fused(through, between(near + BLUE, beside + BLUE, part, values), sums[2])
+    return red, green, blue, through - through * between(near + ALPHA, beside + ALPHA, part, values)
 
 
-@kernel
-def blend_view(offset, width, camera, slices, first, last, shared, t, line):
-    """Add slabs first … last to the pixels of one view, whose sums are rows of `line` from place t on."""
+@inlined
+def load_sums(i, line):
+    """Sums of eight pixels."""
+    return load(line, i + RED), load(line, i + GREEN), load(line, i + BLUE), load(line, i + ALPHA)
+
+
+@inlined
+def store_sums(i, sums, line):
+    """Keep sums of eight pixels."""
+    store(line, i + RED, sums[0])
+    store(line, i + GREEN, sums[1])
+    store(line, i + BLUE, sums[2])
+    store(line, i + ALPHA, sums[3])
+
+
+@inlined
+def place_slabs(offset, camera, slices, first, last, shared):
+    """Where pixel 0 of a view lies in each slab."""
     phases = shared.phases
     for k in range(first, last):
         at = (-offset * shift_of(camera, slices, k) - shared.begin) * shared.fine
         m = np.int64(np.floor(at))
-        part = np.float32(at - m)
-        q, phase = m // phases, m % phases  # pixel 0 is beside position q of this phase
-        slab = (k - first) * phases
-        near = (slab + phase) * SLAB_ROWS * LINE
+        q, phase, slab = m // phases, m % phases, (k - first) * phases
         beside = (slab + phase + 1) * SLAB_ROWS * LINE if phase + 1 < phases else slab * SLAB_ROWS * LINE + 1
-        j = max(q, 0)
-        while True:
-            begin, end = next_run(shared, k - first, j)
-            begin, end = max(begin - 1, j), min(end, shared.length - 1)
-            x0, x1 = begin - q, min(end - q, width)
-            if x0 >= width or begin >= end:
-                break
-            if x1 > x0:
-                blend_run(  # the positions behind, and those behind the picture, do no harm
-                    whole_steps(np.uint64(x1 - x0)),
-                    np.uint64(near + begin),
-                    np.uint64(beside + begin),
-                    part,
-                    np.uint64(t + x0),
-                    shared.values,
-                    line,
-                )
-            j = end
+        shared.places[k - first, POSITION] = q
+        shared.places[k - first, NEAR] = (slab + phase) * SLAB_ROWS * LINE + q
+        shared.places[k - first, BESIDE] = beside + q
+        shared.parts[k - first] = np.float32(at - m)
+
+
+@lean
+def blend_view(offset, width, camera, slices, first, last, shared, t, line):
+    """Add slabs first … last to the pixels of one view, whose sums are rows of `line` from place t on.
+
+    Technique: sums of sixteen pixels stay in registers while they go through all slabs.
+    """
+    place_slabs(offset, camera, slices, first, last, shared)
+    values, places, parts, shown = shared.values, shared.places, shared.parts, shared.shown
+    more, span = np.uint64(LANES), np.uint64(SPAN)
+    for x in range(0, width, 2 * LANES):
+        i = np.uint64(t + x)
+        sums, others = load_sums(i, line), load_sums(i + more, line)
+        if mask_word((sums[3] >= HIDDEN) | (others[3] >= HIDDEN)) == 0:
+            continue
+        for k in range(np.uint64(last - first)):
+            position = np.uint64(places[k, POSITION] + x)
+            if shown[k, position // span] | shown[k, (position + more + more) // span] == 0:
+                continue
+            near, beside = np.uint64(places[k, NEAR] + x), np.uint64(places[k, BESIDE] + x)
+            part = splat(parts[k])
+            sums = add_positions(near, beside, part, values, sums)
+            others = add_positions(near + more, beside + more, part, values, others)
+        store_sums(i, sums, line)
+        store_sums(i + more, others, line)
 
 
 @inlined

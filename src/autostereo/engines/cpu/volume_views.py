@@ -6,17 +6,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .jit import inlined, kernel
+from .jit import inlined, kernel, lean
 from .volume_modes import NONE, march_iso, march_mip, resolve_iso, resolve_mip
 from .volume_rays import (
     DONE,
     END,
     HALF,
     HALF_WAY,
+    HIDDEN,
     KEPT,
     LENGTH,
     ONE,
-    OPAQUE,
     ORIGIN,
     RAYS,
     TOTAL,
@@ -37,7 +37,6 @@ from .volume_shared import ALPHA, BLUE, GREEN, LINE, RED, SLAB_ROWS, blend_view,
 COMPOSITE, MIP, ISO = 0, 1, 2
 PIXELS = RAYS // 3  # of a block of sub-pixels that are averaged
 THIRD = np.float32(1.0 / 3.0)
-HIDDEN = np.float32(OPAQUE / 65536.0)
 BYTE = np.float32(255.0)
 
 
@@ -90,7 +89,7 @@ def average_alphas(pixels, base, rays):
             rays[ray + T] = rays[ray + KEPT] * let * THIRD
 
 
-@kernel
+@lean
 def trace_rays(cuts, row, slices, ways, wants_half, averaged, planes, rays, packed):
     """Take a block of rays, of which ORIGIN, TURN, LENGTH and END are set, through volumes: colours, T and HALF.
 
@@ -162,18 +161,19 @@ def finish_rays(n, base, rays, color):
         color[i, 3] = over(ONE - through, through, color[i, 3])
 
 
-@kernel
+@lean
 def next_slices(cut, row, slices, first, last, planes):
     """Sample the slices of slabs first … last; that of the slabs before is at hand unless first is 0."""
     begin = first
     if first > 0:
-        planes.values[0] = planes.values[SLABS]
+        for j in range(planes.values.shape[1]):
+            planes.values[0, j] = planes.values[SLABS, j]
         begin = first + 1
     for k in range(begin, last + 1):
         sample_slice(cut, row, slices, k, planes, k - first)
 
 
-@kernel
+@lean
 def mark_volumes(cuts, row, slices, planes):
     """Mark the runs of all volumes; returns how many there are."""
     marked = 0
@@ -231,7 +231,7 @@ def keep_group(x, pixels, offset, near, far, camera, cut, alive):
     keep_alive(offset + min(near * left, far * left), offset + max(near * right, far * right), cut, alive)
 
 
-@kernel
+@lean
 def hide_behind_views(views, width, offsets, camera, cut, slices, k, last, planes, line):
     """Leave out what all views have seen enough before, in the slices of slabs k … last."""
     near, far = slices.first + k * slices.distance, slices.first + last * slices.distance
