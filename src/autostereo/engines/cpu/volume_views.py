@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined, kernel, lean
+from .simd import LANES, greater, lesser, load, splat, store, to_float, to_int
 from .volume_modes import NONE, march_iso, march_mip, resolve_iso, resolve_mip
 from .volume_rays import (
     DONE,
@@ -32,7 +33,7 @@ from .volume_rays import (
     ray_stretch,
 )
 from .volume_sample import SLABS, TINY, hide_runs, keep_alive, mark_runs, sample_slice
-from .volume_shared import ALPHA, BLUE, GREEN, LINE, RED, SLAB_ROWS, blend_view, classify_slabs, clear_line, even_out
+from .volume_shared import ALPHA, LINE, SLAB_ROWS, blend_view, classify_slabs, clear_line, even_out, load_sums
 
 COMPOSITE, MIP, ISO = 0, 1, 2
 PIXELS = RAYS // 3  # of a block of sub-pixels that are averaged
@@ -212,15 +213,31 @@ def draw_rows(rows, cuts, camera, slices, ways, offsets, wants_depth, planes, ra
 
 
 @inlined
-def finish_line(width, t, line, color):
-    """Put the sums of a view's pixels over color (W, 4)."""
-    for i in range(width):
-        k = np.uint64(i)
-        through = line[t + ALPHA + k]
-        color[i, 0] = over(line[t + RED + k], through, color[i, 0])
-        color[i, 1] = over(line[t + GREEN + k], through, color[i, 1])
-        color[i, 2] = over(line[t + BLUE + k], through, color[i, 2])
-        color[i, 3] = over(ONE - through, through, color[i, 3])
+def over_eight(front, through, behind, shift):
+    """`over` for one byte of eight pixels, shifted back to its place."""
+    value = front * BYTE + through * to_float((behind >> shift) & np.int32(255)) + HALF_WAY
+    return to_int(lesser(greater(value, ZERO), BYTE)) << shift
+
+
+@inlined
+def finish_line(width, t, line, first, words):
+    """Put the sums of a view's pixels over words first … first + width, RGBA bytes of a pixel each."""
+    whole = width // LANES * LANES
+    for x in range(0, whole, LANES):
+        i, place = np.uint64(t + x), np.uint64(first + x)
+        (red, green, blue, through), behind = load_sums(i, line), load(words, place)
+        red, green = over_eight(red, through, behind, np.int32(0)), over_eight(green, through, behind, np.int32(8))
+        blue = over_eight(blue, through, behind, np.int32(16))
+        alpha = over_eight(splat(ONE) - through, through, behind, np.int32(24))
+        store(words, place, red | green | blue | alpha)
+    for x in range(whole, width):
+        i, place = np.uint64(t + x), np.uint64(first + x)
+        through, behind, word = line[i + ALPHA], words[place], np.int32(0)
+        for c in range(4):
+            front = ONE - through if c == 3 else line[i + np.uint64(c * LINE)]
+            value = over(front, through, (behind >> np.int32(8 * c)) & np.int32(255))
+            word |= np.int32(value) << np.int32(8 * c)
+        words[place] = word
 
 
 @inlined
@@ -250,7 +267,8 @@ def hide_behind_views(views, width, offsets, camera, cut, slices, k, last, plane
 @kernel
 def draw_shared_rows(rows, cut, camera, slices, ways, offsets, planes, shared, rays, packed, line, color):
     """Draw rows (first, end) of every view from slabs that they share, over color (V, H, W, 4)."""
-    views, _, width, _ = color.shape
+    views, height, width, _ = color.shape
+    words = color.reshape(-1).view(np.int32)
     for r in range(rows[0], rows[1]):
         slope = (camera.centre_y - (r + 0.5)) / camera.fy - camera.offset_y / camera.focal
         row = (slope, camera.offset_y)
@@ -270,4 +288,4 @@ def draw_shared_rows(rows, cut, camera, slices, ways, offsets, planes, shared, r
         for v in range(views):
             t, middle = np.uint64(v * SLAB_ROWS * LINE), slices.first + 0.5 * slices.slabs * slices.distance
             even_out(width, offsets[v], middle, camera, row, t, line)
-            finish_line(width, t, line, color[v, r])
+            finish_line(width, t, line, (v * height + r) * width, words)
