@@ -15,6 +15,7 @@ from autostereo.engines.cpu import simd
 from autostereo.engines.cpu.jit import kernel
 from autostereo.engines.cpu.simd import (
     LANES,
+    adjacent,
     append,
     bits,
     ceil,
@@ -22,6 +23,7 @@ from autostereo.engines.cpu.simd import (
     first_fours,
     floor,
     from_bits,
+    fused,
     gather,
     greater,
     high_halves,
@@ -113,7 +115,19 @@ def streamed(a, out):
     stream(out, 0, load(a, LANES))
 
 
-COMPILED = {f.__name__: kernel(f) for f in (arithmetic, doubles_of, whole_numbers, kept, listed, streamed)}
+def neighbours(a, out):
+    """adjacent: each element and the next."""
+    for k in range(out.shape[0]):
+        out[k] = adjacent(a, np.uint64(k))
+
+
+def product_and_sum(a, b, c, out):
+    """fused of eight lanes."""
+    store(out, 0, fused(load(a, 0), load(b, 0), load(c, 0)))
+
+
+KERNELS = (arithmetic, doubles_of, whole_numbers, kept, listed, streamed, neighbours, product_and_sum)
+COMPILED = {f.__name__: kernel(f) for f in KERNELS}
 
 
 def same(a: np.ndarray, b: np.ndarray) -> None:
@@ -184,6 +198,28 @@ def generic_listed():
         compiled = njit(listed)
         compiled(np.zeros(LANES, np.int32), np.int32(0), np.zeros(4 * LANES, np.int32))
     return compiled
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.uint32, np.float32])
+def test_adjacent(kind: type) -> None:
+    bytes_of = np.random.default_rng(5).integers(0, 256, 20 * np.dtype(kind).itemsize, dtype=np.uint8)
+    a, got, wanted = bytes_of.view(kind), np.zeros(19, np.int64), np.zeros(19, np.int64)
+    COMPILED["neighbours"](a, got)
+    neighbours(a, wanted)
+    np.testing.assert_array_equal(got, wanted)
+    narrow = got.astype(np.uint64) & np.uint64(2 ** (8 * a.itemsize) - 1)
+    np.testing.assert_array_equal(narrow.astype(f"u{a.itemsize}"), a[:-1].view(f"u{a.itemsize}"))
+
+
+@given(floats, floats)
+@settings(deadline=None, max_examples=60)
+def test_fused_is_rounded_once_or_twice(a: np.ndarray, b: np.ndarray) -> None:
+    x, y, z, out = a[:LANES], a[LANES:], b[:LANES], np.zeros(LANES, np.float32)
+    COMPILED["product_and_sum"](x, y, z, out)
+    once = (x.astype(np.float64) * y + z).astype(np.float32)  # the product is exact, the sum rounded to 53 bits
+    twice = x * y + z
+    near = np.abs(out - once) <= np.spacing(np.abs(once))
+    assert (near | (out == twice)).all()
 
 
 def test_stream_stores() -> None:

@@ -125,6 +125,14 @@ def test_bad_maps_name_the_field(fields: dict, message: str) -> None:
         ViewMap(**fields)
 
 
+def test_per_pixel_maps_show_one_camera_in_three_sub_pixels() -> None:
+    table = np.repeat(np.arange(4, dtype=np.int32).reshape(2, 2, 1), 3, axis=2)
+    other = table.copy()
+    other[1, 0, 2] = 3
+    assert ViewMap(4, table=table).per_pixel and not ViewMap(4, table=other).per_pixel
+    assert ViewMap(8, a=0.37, offsets=np.array([[0.1] * 3, [0.4] * 3])).per_pixel and not phase_map().per_pixel
+
+
 def test_a_table_has_no_phase() -> None:
     with pytest.raises(InputError, match="a table has no phase"):
         ViewMap(2, np.zeros((1, 1, 3), int)).phase(np.arange(1), np.arange(1))

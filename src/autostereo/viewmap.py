@@ -105,6 +105,13 @@ class ViewMap:
             raise InputError(f"height: cells need the panel's number of rows, got {self.height}")
         object.__setattr__(self, "offsets", offsets)
 
+    @property
+    def per_pixel(self) -> bool:
+        """Whether all three sub-pixels of every pixel show the same camera."""
+        channels = self.offsets if self.table is None else self.table
+        assert channels is not None
+        return bool((channels == channels[..., :1]).all())
+
     def phase(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.float64]:
         """Phase φ ∈ [0, 1) of pixels, reversed if the map is; shape (R, C, 3) for rows (R,) and columns (C,)."""
         if self.offsets is None:

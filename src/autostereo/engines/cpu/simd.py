@@ -36,6 +36,16 @@ def gather(array, indices):
     return array[indices]
 
 
+def adjacent(array, index):
+    """Elements `index` and the next of an unsigned or float32 array as one int64, the first in its lower half.
+
+    One load for both.
+    """
+    size = 8 * array.itemsize
+    first, second = (int(array[k : k + 1].view(f"u{array.itemsize}")[0]) for k in (int(index), int(index) + 1))
+    return np.uint64(first | second << size).view(np.int64)
+
+
 def append(array, index, vector, mask):
     """Write the lanes of an int32 vector where the mask holds from `index` on.
 

@@ -175,10 +175,23 @@ def _vector_of(array: Any) -> Any:
     return _OF_SCALAR.get(array.dtype) if isinstance(array, types.Array) and array.ndim == 1 else None
 
 
+def _splits(array: Any) -> bool:
+    """Whether `adjacent` takes the array."""
+    kinds = (types.uint8, types.uint16, types.uint32, types.float32)
+    return isinstance(array, types.Array) and array.ndim == 1 and array.dtype in kinds
+
+
 def _emit_load(context, builder, sig, args):
     pointer = _pointer(context, builder, sig.args[0], args[0], args[1], sig.args[1])
     place = builder.bitcast(pointer, _LLVM[sig.return_type].as_pointer())
     return builder.load(place, align=sig.return_type.scalar.bitwidth // 8)
+
+
+def _emit_adjacent(context, builder, sig, args):
+    pointer = _pointer(context, builder, sig.args[0], args[0], args[1], sig.args[1])
+    size = sig.args[0].dtype.bitwidth
+    both = builder.load(builder.bitcast(pointer, ir.IntType(2 * size).as_pointer()), align=size // 8)
+    return both if size == 32 else builder.zext(both, ir.IntType(64))
 
 
 def _emit_store(context, builder, sig, args):
@@ -331,6 +344,7 @@ def _both(a: Any, b: Any) -> Any:
 
 
 _function(simd.load, lambda array, index: _vector_of(array), _emit_load)
+_function(simd.adjacent, lambda array, index: types.int64 if _splits(array) else None, _emit_adjacent)
 _function(simd.store, lambda array, index, vector: types.none if _vector_of(array) is vector else None, _emit_store)
 _function(
     simd.keep_greater,

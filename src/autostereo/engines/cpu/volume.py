@@ -302,9 +302,10 @@ def draw_volume_panel(
     assert draw.viewmap is not None
     plan = panel_lines(draw, memory)
     panel = Panel(plan, draw.flip_x, draw.flip_y, options.sampling == "subpixel")
-    averaged = options.alpha == "averaged"
+    joined = draw.viewmap.per_pixel and not panel.subpixel  # a view's worth of rays: exact ones are cheaper, too
+    averaged = options.alpha == "averaged" and not joined
     numbers = camera_numbers(camera)
-    may_share = depth.size == 0 and can_share(camera, slices, np.array([plan.low, plan.high]))
+    may_share = not joined and depth.size == 0 and can_share(camera, slices, np.array([plan.low, plan.high]))
     reach = np.array([plan.low, plan.high])
     for group in volume_groups(prepared, opaque):
         shared = may_share and is_shared(prepared, group, options)
@@ -324,7 +325,7 @@ def draw_volume_panel(
                     one = (rows, cuts[0], numbers, own, ways[0])
                     draw_panel_rows(*one, panel, averaged, planes[0], slabs, scratch, color)
                 else:
-                    all_of = (rows, cuts, numbers, own, ways, panel, averaged, opaque and depth.size > 0)
+                    all_of = (rows, cuts, numbers, own, ways, panel, averaged, joined, opaque and depth.size > 0)
                     draw_panel_rays(*all_of, planes, scratch, color, depth)
 
         run_rows(camera.height, task)

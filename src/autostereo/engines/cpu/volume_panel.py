@@ -175,11 +175,13 @@ def even_sub_pixel(x, offset, middle, camera, row, total, through):
 
 
 @kernel
-def draw_panel_rays(rows, cuts, camera, slices, ways, panel, averaged, wants_depth, planes, scratch, color, depth):
+def draw_panel_rays(
+    rows, cuts, camera, slices, ways, panel, averaged, joined, wants_depth, planes, scratch, color, depth
+):
     """Draw rows (first, end) of the picture, every sub-pixel along its own ray, over the panel color (H, W, 3).
 
     cuts, ways, planes, depth (H, W, 3): see volume_views.draw_rows. A block of rays is one channel of RAYS pixels or,
-    `averaged`, all three of fewer.
+    `averaged`, all three of fewer; `joined`, a pixel's three sub-pixels share their ray.
     """
     offsets, u, rays, index, _ = scratch
     height, width, _ = color.shape
@@ -191,7 +193,7 @@ def draw_panel_rays(rows, cuts, camera, slices, ways, panel, averaged, wants_dep
             continue
         shown = height - 1 - r if panel.flip_y else r
         row_offsets(shown, width, panel.flip_x, (0, width), 0, 0, width, panel.plan, u, offsets)
-        for block in range(1 if averaged else 3):
+        for block in range(1 if averaged or joined else 3):
             for first in range(0, width, pixels):
                 for i in range(RAYS):
                     c, p = (min(i // PIXELS, 2), i % PIXELS) if averaged else (block, i)
@@ -213,7 +215,8 @@ def draw_panel_rays(rows, cuts, camera, slices, ways, panel, averaged, wants_dep
                     if x >= width:
                         continue
                     column = width - 1 - x if panel.flip_x else x
-                    total = rays[k + R] if c == 0 else (rays[k + G] if c == 1 else rays[k + B])
-                    color[shown, column, c] = over(total, rays[k + T], color[shown, column, c])
-                    if wants_depth:
-                        depth[shown, column, c] = min(depth[shown, column, c], rays[k + HALF])
+                    for channel in range(c, 3 if joined else c + 1):
+                        total = rays[k + R] if channel == 0 else (rays[k + G] if channel == 1 else rays[k + B])
+                        color[shown, column, channel] = over(total, rays[k + T], color[shown, column, channel])
+                        if wants_depth:
+                            depth[shown, column, channel] = min(depth[shown, column, channel], rays[k + HALF])

@@ -11,6 +11,7 @@ import numpy as np
 
 from .jit import inlined, lean
 from .scalars import exp2_fast, log2_fast, whole_steps
+from .simd import LANES, append, iota, load
 from .volume_sample import (
     AT,
     EYE,
@@ -22,6 +23,7 @@ from .volume_sample import (
     any_marked,
     light_points,
     on_slice,
+    part_of,
     scalar_points,
 )
 
@@ -114,9 +116,8 @@ def light_slab(n, base, middle, cut, row, own_eyes, planes, rays):
     """Light at the middle of a slab into LIT, on rays that see it: SHARE is its opacity. Returns whether any does."""
     lists, chosen, d, own = planes.lists, planes.chosen, np.float32(middle), ONE if own_eyes else ZERO
     m = np.uint64(0)
-    for i in range(n):
-        chosen[m] = np.int32(i)
-        m += np.uint64(rays[base + SHARE + i] > ZERO)
+    for i in range(np.uint64(0), n, np.uint64(LANES)):
+        m = append(chosen, m, iota() + np.int32(i), load(rays, base + SHARE + i) > ZERO)
     if m == np.uint64(0) or cut.channels == 0:
         return m > np.uint64(0)
     whole = whole_steps(m)
@@ -241,9 +242,9 @@ def blend(n, base, material, light, rays, packed):
             w = rays[base + T + i] * rays[base + SHARE + i]
             factor = w * COLOR_STEP * (a + d * rays[base + LIT + i])
             c = packed[i]
-            rays[base + R + i] += factor * np.float32(c & TEN_BITS)
-            rays[base + G + i] += factor * np.float32((c >> np.int32(10)) & TEN_BITS)
-            rays[base + B + i] += factor * np.float32((c >> np.int32(20)) & TEN_BITS)
+            rays[base + R + i] += factor * part_of(c, np.int32(0), TEN_BITS)
+            rays[base + G + i] += factor * part_of(c, np.int32(10), TEN_BITS)
+            rays[base + B + i] += factor * part_of(c, np.int32(20), TEN_BITS)
             rays[base + T + i] -= w
         return
     specular = channels > colors
@@ -251,11 +252,11 @@ def blend(n, base, material, light, rays, packed):
         w = rays[base + T + i] * rays[base + SHARE + i]
         c = packed[i]
         factor, added = reflect(light, material, colors, specular, base, i, 0, rays)
-        rays[base + R + i] += w * (factor * np.float32(c & TEN_BITS) * COLOR_STEP + added)
+        rays[base + R + i] += w * (factor * part_of(c, np.int32(0), TEN_BITS) * COLOR_STEP + added)
         factor, added = reflect(light, material, colors, specular, base, i, 1, rays)
-        rays[base + G + i] += w * (factor * np.float32((c >> np.int32(10)) & TEN_BITS) * COLOR_STEP + added)
+        rays[base + G + i] += w * (factor * part_of(c, np.int32(10), TEN_BITS) * COLOR_STEP + added)
         factor, added = reflect(light, material, colors, specular, base, i, 2, rays)
-        rays[base + B + i] += w * (factor * np.float32((c >> np.int32(20)) & TEN_BITS) * COLOR_STEP + added)
+        rays[base + B + i] += w * (factor * part_of(c, np.int32(20), TEN_BITS) * COLOR_STEP + added)
         rays[base + T + i] -= w
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from .jit import inlined, lean
 from .scalars import exp2_fast, log2_fast
+from .simd import adjacent
 from .volume_setup import BLOCK, TABLE
 
 CHUNK = 4  # log2 of samples in a run
@@ -134,13 +135,15 @@ def locate(n, start, direction, shape, place, lists):
     """First of the eight voxels around n samples at start + AT·direction, clamped to the grid, and the parts beyond."""
     x, y, z = np.float32(start[0]), np.float32(start[1]), np.float32(start[2])
     dx, dy, dz = np.float32(direction[0]), np.float32(direction[1]), np.float32(direction[2])
+    nx, ny = np.int64(np.int32(shape[0])), np.int32(shape[1])  # numbers of lines fit 32 bits, those of voxels may not
     ex, ey, ez = np.float32(shape[0] - 1), np.float32(shape[1] - 1), np.float32(shape[2] - 1)
     for i in range(n):
         t = lists[AT + i]
         u, v, w = min(max(x + t * dx, ZERO), ex), min(max(y + t * dy, ZERO), ey), min(max(z + t * dz, ZERO), ez)
         a, b, c = min(np.floor(u), ex - ONE), min(np.floor(v), ey - ONE), min(np.floor(w), ez - ONE)
         lists[PX + i], lists[PY + i], lists[PZ + i] = u - a, v - b, w - c
-        place[i] = (np.int64(c) * shape[1] + np.int64(b)) * shape[0] + np.int64(a)
+        line = np.int32(np.int32(c) * ny + np.int32(b))
+        place[i] = np.int64(line) * nx + np.int64(np.int32(a))
 
 
 @inlined
@@ -184,13 +187,33 @@ def interpolate_parts(n, shift, mask, row, words, lists):
 
 
 @inlined
-def interpolate_words(n, row, words, lists):
-    """Trilinear interpolation of the words that were brought, into a row of lists."""
+def interpolate_gradients(n, shifts, mask, words, lists):
+    """Trilinear interpolation of the gradients in words that were brought."""
+    interpolate_parts(n, np.int32(0), mask, NX, words, lists)
+    interpolate_parts(n, shifts[0], mask, NY, words, lists)
+    interpolate_parts(n, shifts[1], mask, NZ, words, lists)
+
+
+@inlined
+def bring_pairs(n, source, shape, place, words):
+    """The eight scalars around n located samples, two neighbours in a word."""
+    down, deep = np.uint64(shape[0]), np.uint64(shape[0] * shape[1])
     for i in range(n):
-        a, b, c, d = words[W0 + i], words[W1 + i], words[W2 + i], words[W3 + i]
-        e, f, g, h = words[W4 + i], words[W5 + i], words[W6 + i], words[W7 + i]
-        a, b, c, d = np.float32(a), np.float32(b), np.float32(c), np.float32(d)
-        e, f, g, h = np.float32(e), np.float32(f), np.float32(g), np.float32(h)
+        k = np.uint64(place[i])
+        words[W0 + i], words[W1 + i] = np.int32(adjacent(source, k)), np.int32(adjacent(source, k + down))
+        k += deep
+        words[W2 + i], words[W3 + i] = np.int32(adjacent(source, k)), np.int32(adjacent(source, k + down))
+
+
+@inlined
+def interpolate_pairs(n, bits, mask, row, words, lists):
+    """Trilinear interpolation of scalars brought in pairs, the second `bits` above the first, into a row of lists."""
+    for i in range(n):
+        first, second, third, fourth = words[W0 + i], words[W1 + i], words[W2 + i], words[W3 + i]
+        a, b = part_of(first, np.int32(0), mask), part_of(first, bits, mask)
+        c, d = part_of(second, np.int32(0), mask), part_of(second, bits, mask)
+        e, f = part_of(third, np.int32(0), mask), part_of(third, bits, mask)
+        g, h = part_of(fourth, np.int32(0), mask), part_of(fourth, bits, mask)
         lists[row + i] = trilinear(lists[PX + i], lists[PY + i], lists[PZ + i], a, b, c, d, e, f, g, h)
 
 
@@ -257,8 +280,11 @@ def scalar_points(n, cut, start, place, words, lists):
     """Scalars, as rows of the table, into VALUE, of n ≤ 256 samples at X = AT; start: see light_points."""
     m = cut.from_eye
     locate(n, start, (m[0, 0], m[1, 0], m[2, 0]), cut.shape, place, lists)
-    bring(n, cut.scalars, cut.shape, place, words)
-    interpolate_words(n, VALUE, words, lists)
+    bring_pairs(n, cut.scalars, cut.shape, place, words)
+    if cut.scalars.itemsize == 1:  # as constants, for SIMD of 32 bits
+        interpolate_pairs(n, np.int32(8), np.int32(255), VALUE, words, lists)
+    else:
+        interpolate_pairs(n, np.int32(16), np.int32(65535), VALUE, words, lists)
     low, scale = np.float32(cut.low), np.float32(cut.scale)
     for i in range(n):
         lists[VALUE + i] = min(max((lists[VALUE + i] - low) * scale, ZERO), LAST_ROW)
@@ -273,10 +299,10 @@ def light_points(n, cut, y, depth, start, place, words, lists):
     m = cut.from_eye
     locate(n, start, (m[0, 0], m[1, 0], m[2, 0]), cut.shape, place, lists)
     bring(n, cut.words, cut.shape, place, words)
-    bits, mask = (np.int32(8), np.int32(255)) if cut.scalars.itemsize == 1 else (np.int32(10), np.int32(1023))
-    interpolate_parts(n, np.int32(0), mask, NX, words, lists)
-    interpolate_parts(n, bits, mask, NY, words, lists)
-    interpolate_parts(n, bits + bits, mask, NZ, words, lists)
+    if cut.scalars.itemsize == 1:  # as constants, for SIMD of 32 bits
+        interpolate_gradients(n, (np.int32(8), np.int32(16)), np.int32(255), words, lists)
+    else:
+        interpolate_gradients(n, (np.int32(10), np.int32(20)), np.int32(1023), words, lists)
     light_samples(n, cut, y, depth, lists)
 
 
