@@ -40,7 +40,7 @@ from .volume_views import ISO, MIP, Ways, draw_rows, draw_shared_rows
 MODES = ("composite", "mip", "iso")  # in the order of volume_views
 FINE = (1 / 8, 1 / 3)  # of a voxel: least and greatest distance of samples on a slice
 PER_PIXEL = 1.4  # distance of samples on a slice, in pixels of the nearest one
-FINE_VIEWS = (2, 8, 4)  # positions of a shared slab: least and most per pixel, and per voxel between them
+FINE_VIEWS = (1, 8, 3)  # positions of a shared slab: least and most per pixel, and per voxel between them
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,18 +9,20 @@ import numpy as np
 
 from .jit import inlined, kernel, lean
 from .panel_lines import row_offsets
-from .volume_rays import END, HALF, HIDDEN, LENGTH, ONE, ORIGIN, RAYS, ROW, TURN, ZERO, B, G, R, T
+from .scalars import exp2_fast, log2_fast
+from .simd import adjacent
+from .volume_rays import END, HALF, HIDDEN, LENGTH, ONE, ORIGIN, RAYS, ROW, TURN, ZERO, B, G, R, T, mix_pair
 from .volume_sample import SLABS, hide_runs, keep_alive, mark_runs
 from .volume_shared import ALPHA, LINE, SLAB_ROWS, SPAN, classify_slabs, shift_of
 from .volume_views import PIXELS, mark_volumes, next_slices, over, trace_rays
 
-AT, MOVE, SHARE_R, CUT_R, A0, A1, C0, C1, SUM, THROUGH = (np.uint64(k * ROW) for k in range(10))
-PIXEL_ROWS = 10
+AT, MOVE, SHARE_R, CUT_R, A0, C0, SUM, THROUGH = (np.uint64(k * ROW) for k in range(8))
+PIXEL_ROWS = 8
 THIRD = np.float32(1.0 / 3.0)
 
 
 @inlined
-def fetch_pixels(n, base, slab, channel, last, values, pixels, index):
+def fetch_pixels(n, base, slab, channel, last, values, pixels, index, pairs):
     """One channel and the opacity of a slab at the places AT − MOVE·shift of sub-pixels; AT holds the place itself."""
     for i in range(n):
         at = min(max(pixels[base + CUT_R + i], ZERO), last)
@@ -29,16 +31,15 @@ def fetch_pixels(n, base, slab, channel, last, values, pixels, index):
         index[i] = np.int32(m)
     for i in range(n):
         k = slab + np.uint64(index[i])
-        pixels[base + A0 + i], pixels[base + A1 + i] = values[k + ALPHA], values[k + ALPHA + np.uint64(1)]
-        pixels[base + C0 + i], pixels[base + C1 + i] = values[k + channel], values[k + channel + np.uint64(1)]
+        pairs[i], pairs[n + i] = adjacent(values, k + ALPHA), adjacent(values, k + channel)
     for i in range(n):
         part = pixels[base + SHARE_R + i]
-        pixels[base + A0 + i] += part * (pixels[base + A1 + i] - pixels[base + A0 + i])
-        pixels[base + C0 + i] += part * (pixels[base + C1 + i] - pixels[base + C0 + i])
+        pixels[base + A0 + i] = mix_pair(pairs[i], part)
+        pixels[base + C0 + i] = mix_pair(pairs[n + i], part)
 
 
 @lean
-def blend_pixels(blocks, averaged, camera, slices, first, last, shared, pixels, index):
+def blend_pixels(blocks, averaged, camera, slices, first, last, shared, pixels, index, pairs):
     """Add slabs first … last to the sub-pixels of a row, in blocks of 64 for each channel, each at its own place."""
     n = np.uint64(RAYS)
     stride = PIXEL_ROWS * ROW
@@ -65,7 +66,9 @@ def blend_pixels(blocks, averaged, camera, slices, first, last, shared, pixels, 
                 base = np.uint64((3 * b + c) * stride)
                 for i in range(n):
                     pixels[base + CUT_R + i] = pixels[base + AT + i] - pixels[base + MOVE + i] * shift
-                fetch_pixels(n, base, slab, np.uint64(c) * np.uint64(LINE), bound, shared.values, pixels, index)
+                fetch_pixels(
+                    n, base, slab, np.uint64(c) * np.uint64(LINE), bound, shared.values, pixels, index, pairs
+                )
             if averaged:
                 red, green, blue = (
                     np.uint64(3 * b * stride),
@@ -152,7 +155,7 @@ def draw_panel_rows(rows, cut, camera, slices, ways, panel, averaged, planes, sh
             next_slices(cut, row, slices, k, last, planes)
             args = (ways.table, ways.material, ways.light, planes, shared, rays, index)
             classify_slabs(cut, camera, row, slices, k, last, *args)
-            blend_pixels(blocks, averaged, camera, slices, k, last, shared, pixels, index)
+            blend_pixels(blocks, averaged, camera, slices, k, last, shared, pixels, index, planes.place)
         for c in range(3):
             for x in range(width):
                 k = np.uint64((3 * (x // RAYS) + c) * stride + x % RAYS)
@@ -170,7 +173,7 @@ def even_sub_pixel(x, offset, middle, camera, row, total, through):
     own = (x + 0.5 - camera.centre_x) / camera.fx - offset / camera.focal
     centre, slope = own + offset / middle, 1.0 + row[0] * row[0]
     ratio = np.sqrt((slope + own * own) / (slope + centre * centre))
-    even = np.float32(max(through, np.float32(1e-30)) ** ratio)
+    even = exp2_fast(np.float32(ratio) * log2_fast(max(through, np.float32(1e-30))))
     return total * ((ONE - even) / max(ONE - through, np.float32(1e-6))), even
 
 

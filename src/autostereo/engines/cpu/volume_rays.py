@@ -11,7 +11,7 @@ import numpy as np
 
 from .jit import inlined, lean
 from .scalars import exp2_fast, log2_fast, whole_steps
-from .simd import LANES, append, iota, load
+from .simd import LANES, adjacent, append, iota, load
 from .volume_sample import (
     AT,
     EYE,
@@ -31,9 +31,9 @@ RAYS = 128  # of a block
 ROW = 144  # distance of a block's rows
 (
     ORIGIN, TURN, ENTER, LEAVE, LENGTH, T, R, G, B, HALF, FRONT, BACK, OPTICAL, SHARE,
-    PART, LEFT, RIGHT, END, LIT, TOTAL, DONE, KEPT,
-) = (np.uint64(k * ROW) for k in (*range(19), 24, 25, 26))  # fmt: skip
-BLOCK_ROWS = 27
+    PART, END, LIT, TOTAL, DONE, KEPT,
+) = (np.uint64(k * ROW) for k in (*range(17), 22, 23, 24))  # fmt: skip
+BLOCK_ROWS = 25
 ZERO, ONE, HALF_WAY = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 TEN_BITS, COLOR_STEP = np.int32(1023), np.float32(1.0 / 1023.0)
 OPAQUE = 128  # transmittance in 65536ths, below which a ray has seen enough
@@ -82,22 +82,26 @@ def locate_rays(n, base, depth, cut, samples, rays, index):
 
 
 @inlined
-def sample_rays(n, base, line, target, rays, index):
-    """A slice's samples beside the located rays, interpolated, into row `target`."""
-    for i in range(n):
-        k = np.uint64(index[i])
-        rays[base + LEFT + i] = line[k]
-        rays[base + RIGHT + i] = line[k + np.uint64(1)]
-    for i in range(n):
-        a = rays[base + LEFT + i]
-        rays[base + target + i] = a + rays[base + PART + i] * (rays[base + RIGHT + i] - a)
+def lower_half(pair):
+    """The first of two float32 that `simd.adjacent` brought."""
+    return np.int32(pair & np.int64(0xFFFFFFFF)).view(np.float32)
 
 
 @inlined
-def sample_grid(n, base, depth, cut, values, scalar, rays, index):
-    """Scalars of a sampled slice, values (J,), into row `scalar`."""
+def mix_pair(pair, part):
+    """Between two float32 that `simd.adjacent` brought."""
+    left = lower_half(pair)
+    return left + part * (np.int32(pair >> np.int64(32)).view(np.float32) - left)
+
+
+@inlined
+def sample_grid(n, base, depth, cut, values, scalar, pairs, rays, index):
+    """Scalars of a sampled slice, values (J,), interpolated beside the rays, into row `scalar`."""
     locate_rays(n, base, depth, cut, values.shape[0], rays, index)
-    sample_rays(n, base, values, scalar, rays, index)
+    for i in range(n):
+        pairs[i] = adjacent(values, np.uint64(index[i]))
+    for i in range(n):
+        rays[base + scalar + i] = mix_pair(pairs[i], rays[base + PART + i])
 
 
 @lean
@@ -206,15 +210,16 @@ def trim_ends(n, base, cut, row, depth, distance, rays):
 
 
 @inlined
-def classify(n, base, extinction, color, rays, packed):
+def classify(n, base, table, entries, rays, packed):
     """Optical depth of a slab of nominal length, and its packed colour, from the scalars at its two ends."""
     for i in range(n):
         front, back = np.int32(rays[base + FRONT + i] + HALF_WAY), np.int32(rays[base + BACK + i] + HALF_WAY)
         packed[i] = np.int32(np.int32(front << np.int32(8)) + back)
     for i in range(n):
-        k = np.uint64(packed[i])
-        rays[base + OPTICAL + i] = extinction[k]
-        packed[i] = color[k]
+        entries[i] = table[np.uint64(packed[i])]
+    for i in range(n):
+        rays[base + OPTICAL + i] = lower_half(entries[i])
+        packed[i] = np.int32(entries[i] >> np.int64(32))
 
 
 @inlined
@@ -311,7 +316,7 @@ def add_optical(n, base, cut, row, slices, k, way, planes, rays, packed):
     sample_volume(n, base, depth + slices.distance, cut, row, planes, BACK, rays)
     share_of_slab(n, base, depth, slices.distance, rays)
     trim_ends(n, base, cut, row, depth, slices.distance, rays)
-    classify(n, base, way.table.extinction, way.table.color, rays, packed)
+    classify(n, base, way.table, planes.place, rays, packed)
     for i in range(n):
         rays[base + TOTAL + i] += rays[base + OPTICAL + i] * rays[base + SHARE + i] * rays[base + LENGTH + i]
 
@@ -354,7 +359,7 @@ def march(n, base, cut, row, slices, first, last, way, wants_half, among, planes
         sample_volume(n, base, after, cut, row, planes, BACK, rays)
         share_of_slab(n, base, depth, slices.distance, rays)
         trim_ends(n, base, cut, row, depth, slices.distance, rays)
-        classify(n, base, way.table.extinction, way.table.color, rays, packed)
+        classify(n, base, way.table, planes.place, rays, packed)
         for i in range(n):
             rays[base + SHARE + i] *= rays[base + OPTICAL + i] * rays[base + LENGTH + i]
         if among:

@@ -191,29 +191,16 @@ def prepare_field(volume: Volume, wide: bool) -> Field:
 # --- classification ------------------------------------------------------------------------------------------------
 
 
-class Table(NamedTuple):
-    """Pre-integrated slabs: [front, back] over 256 scalars from low to high.
+def make_table(transfer: TransferFunction, low: float, high: float, length: float) -> NDArray[np.int64]:
+    """Return the table of slabs of a length in scene units: [front, back] over 256 scalar values from low to high.
 
-    opacity (65536,) float32: of a slab of the nominal length; extinction (65536,) float32: optical depth of such a
-    slab, in powers of ½; color (65536,) int32: 10 bits a channel.
+    (65536,) int64, below the bits of a float32, the optical depth in powers of ½, above the colour, 10 bits a channel.
     """
-
-    opacity: NDArray[np.float32]
-    extinction: NDArray[np.float32]
-    color: NDArray[np.int32]
-
-
-def make_table(transfer: TransferFunction, low: float, high: float, length: float) -> Table:
-    """Return the table of slabs of a length in scene units for scalar values low … high."""
     high = high if high > low else low + max(abs(low), 1.0)
     rgba = transfer.table(low, high, TABLE, length).reshape(-1, 4)
-    optical = rgba[:, 3].astype(np.float64) * length
-    c = np.floor(np.clip(rgba[:, :3], 0, 1) * 1023.0 + 0.5).astype(np.int32)
-    return Table(
-        -np.expm1(-optical).astype(np.float32),
-        (optical / np.log(2.0)).astype(np.float32),
-        c[:, 0] | (c[:, 1] << 10) | (c[:, 2] << 20),
-    )
+    optical = (rgba[:, 3].astype(np.float64) * length / np.log(2.0)).astype(np.float32)
+    c = np.floor(np.clip(rgba[:, :3], 0, 1) * 1023.0 + 0.5).astype(np.int64)
+    return optical.view(np.int32).astype(np.int64) | (c[:, 0] | (c[:, 1] << 10) | (c[:, 2] << 20)) << 32
 
 
 def shown_blocks(field: Field, reach: int) -> NDArray[np.uint8]:

@@ -134,11 +134,11 @@ def classify_slabs(cut, camera, row, slices, first, last, table, material, light
                             shared.values[clear + i] = ZERO
                     continue
                 if not fresh:
-                    sample_grid(n, base, depth, cut, planes.values[k - first], FRONT, rays, packed)
-                sample_grid(n, base, after, cut, planes.values[k - first + 1], BACK, rays, packed)
+                    sample_grid(n, base, depth, cut, planes.values[k - first], FRONT, planes.place, rays, packed)
+                sample_grid(n, base, after, cut, planes.values[k - first + 1], BACK, planes.place, rays, packed)
                 share_of_slab(n, base, depth, slices.distance, rays)
                 trim_ends(n, base, cut, row, depth, slices.distance, rays)
-                classify(n, base, table.extinction, table.color, rays, packed)
+                classify(n, base, table, planes.place, rays, packed)
                 for i in range(n):
                     optical = rays[base + OPTICAL + i] * rays[base + SHARE + i] * rays[base + LENGTH + i]
                     rays[base + SHARE + i] = ONE - exp2_fast(-optical)

@@ -44,13 +44,13 @@ BYTE = np.float32(255.0)
 class Ways(NamedTuple):
     """How volumes are drawn.
 
-    mode: COMPOSITE, MIP or ISO; table: pre-integrated slabs; material = (ambient, diffuse, specular); light =
-    (channels, colours); colors: of all levels for MIP, in the first row that of an isosurface; level: of the surface,
-    as a row of the table; shade; own_eyes: highlights for a ray's own eye, not the centre's.
+    mode: COMPOSITE, MIP or ISO; table: pre-integrated slabs, see make_table; material = (ambient, diffuse, specular);
+    light = (channels, colours); colors: of all levels for MIP, in the first row that of an isosurface; level: of the
+    surface, as a row of the table; shade; own_eyes: highlights for a ray's own eye, not the centre's.
     """
 
     mode: int
-    table: tuple
+    table: np.ndarray
     material: tuple
     light: tuple
     colors: np.ndarray
