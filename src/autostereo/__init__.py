@@ -25,7 +25,7 @@ _HOME = {
     "frame": ["ViewStack", "Panel"],
     "viewmap": ["ViewMap"],
     "engines.options": ["Options"],
-    "render": ["render", "render_views", "Renderer", "interlace", "observe"],
+    "render": ["render", "render_views", "Renderer", "interlace", "observe", "warp"],
     "io": ["load"],
 }
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
@@ -50,6 +50,7 @@ if TYPE_CHECKING:  # "as" tells type checkers that a name is public
     from .render import observe as observe
     from .render import render as render
     from .render import render_views as render_views
+    from .render import warp as warp
     from .scene.appearance import DirectionalLight as DirectionalLight
     from .scene.appearance import Material as Material
     from .scene.appearance import PointLight as PointLight

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -18,8 +17,9 @@ from .encoders.rgbd import disparity_map, wowvx
 from .encoders.stereo import pack
 from .engines.engine import Camera, Draw, Target, get_engine
 from .engines.options import Options
-from .errors import InputError, MemoryLimitError, UnsupportedError
+from .errors import InputError, UnsupportedError
 from .frame import Panel, ViewStack
+from .memory import aligned_empty, check_memory
 from .methods import depth_of_field
 from .scene.scene import Scene
 from .scene.transfer import TransferFunction
@@ -27,7 +27,6 @@ from .scene.volume import Volume
 
 MAX_SIDE = 65536
 MAX_VIEWS = 4096
-CACHE_LINE = 64  # bytes
 
 
 def render(
@@ -43,7 +42,7 @@ def render(
     rig : Rig, optional
         Cameras; the display's number of views is spread over its baseline. None: `Rig.frame(scene, display)`.
     method : str
-        "single-pass", "n-pass", "n-pass-subres"; engine gl has more: `get_engine("gl").methods`.
+        "single-pass", "n-pass", "n-pass-subres", "dibr"; engine gl has more: `get_engine("gl").methods`.
     engine : {"auto", "cpu", "gl", "reference"}
     options : Options, optional
 
@@ -238,6 +237,47 @@ def interlace(views: ViewStack, display: Display) -> Panel:
     return Panel(pixels)
 
 
+def warp(pictures: ViewStack, rig: Rig, offsets: Sequence[float] | NDArray[np.float64] = (0.0,)) -> ViewStack:
+    """Views made of pictures with depth, such as one RGBD picture: method "dibr" without a scene.
+
+    Parameters
+    ----------
+    pictures : ViewStack
+        R pictures (R, H, W, 4) with depth (R, H, W), eye depth in the rig's units; inf where there is nothing.
+    rig : Rig
+        Its field of view and focal plane are those that the pictures were taken with.
+    offsets : sequence of R numbers
+        Where on the rig's line of cameras the pictures were taken from; 0 is its middle.
+
+    Returns
+    -------
+    ViewStack
+        The rig's views, color (V, H, W, 4) and depth (V, H, W).
+
+    Raises
+    ------
+    InputError
+        There is no depth, some of it is not > 0, or there are not as many offsets as pictures.
+    """
+    if not isinstance(pictures, ViewStack) or pictures.depth is None:
+        raise InputError("pictures: expected a ViewStack with depth")
+    places = np.asarray(offsets, dtype=np.float64)
+    if places.shape != (pictures.views,) or not np.isfinite(places).all():
+        raise InputError(f"offsets: expected {pictures.views} numbers, one a picture, got {places.size}")
+    if not (pictures.depth > 0).all():
+        raise InputError("pictures: expected depths > 0, inf where there is nothing, found zero, negative or NaN")
+    from .engines.cpu import dibr
+
+    camera, shape = make_camera(rig, (pictures.width, pictures.height)), (rig.views, *pictures.color.shape[1:])
+    check_memory(2 * int(np.prod([int(n) for n in shape])), describe(shape))
+    color = np.empty(shape, np.uint8)
+    depth = np.empty(color.shape[:3], np.float32)
+    references = Target(np.ascontiguousarray(pictures.color), np.asarray(pictures.depth, np.float32))
+    for k, offset in enumerate(rig.camera_offsets):
+        dibr.warp(references, places, camera, float(offset), Target(color[k : k + 1], depth[k : k + 1]))
+    return ViewStack(color, depth)
+
+
 def observe(
     panel: Panel, display: Display, view: float | None = None, *, eye: tuple[float, float] | None = None,
     crosstalk: float = 0.0,
@@ -285,14 +325,6 @@ def check_arguments(rig: Any, options: Any) -> None:
         raise InputError(f"rig views: expected at most {MAX_VIEWS}, got {rig.views}")
     if options is not None and not isinstance(options, Options):
         raise InputError(f"options: expected Options(…), got {type(options).__name__}")
-
-
-def aligned_empty(shape: tuple[int, ...], dtype: type) -> NDArray[Any]:
-    """An array that begins with a cache line, so that engines can write whole lines of it."""
-    size = int(np.prod([int(n) for n in shape])) * np.dtype(dtype).itemsize
-    room = np.empty(size + CACHE_LINE, np.uint8)
-    first = -room.ctypes.data % CACHE_LINE
-    return room[first : first + size].view(dtype).reshape(shape)
 
 
 def make_camera(rig: Rig, size: tuple[int, int]) -> Camera:
@@ -350,25 +382,3 @@ def describe(shape: tuple[int, ...]) -> str:
     if len(shape) == 3 and shape[2] == 3:
         return f"a panel of {shape[1]}×{shape[0]} pixels"
     return f"{shape[0]} views of {shape[2]}×{shape[1]} pixels"
-
-
-def check_memory(need: int, what: str) -> None:
-    """Raise MemoryLimitError when `need` bytes are more than the machine has free."""
-    free = available_memory()
-    if free is not None and need > 0.9 * free:
-        raise MemoryLimitError(f"{what} would take {need / 1e9:.1f} GB of memory, and {free / 1e9:.1f} GB are free")
-
-
-def available_memory() -> int | None:
-    """Bytes of memory that a process may still take, where the system tells."""
-    try:
-        with open("/proc/meminfo", encoding="ascii") as file:
-            for line in file:
-                if line.startswith("MemAvailable:"):
-                    return int(line.split()[1]) * 1024
-    except OSError:
-        pass
-    try:
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):
-        return None

@@ -67,7 +67,7 @@ Continuous = Annotated[
 Background = Annotated[
     str | None, typer.Option("--background", metavar="COLOR", help="#rrggbb, R,G,B in 0…1, black, grey or white.")
 ]
-Method = Annotated[str, typer.Option("--method", help="single-pass, n-pass or n-pass-subres; engine gl has more.")]
+Method = Annotated[str, typer.Option("--method", help="single-pass, n-pass, n-pass-subres or dibr; gl has more.")]
 EngineName = Annotated[str, typer.Option("--engine", help="auto, cpu, gl or reference.")]
 Shading = Annotated[str, typer.Option("--shading", help="exact, center or reuse.")]
 Lighting = Annotated[str, typer.Option("--lighting", help="sample or vertex.")]
@@ -88,7 +88,12 @@ Transfer = Annotated[
 Mode = Annotated[str | None, typer.Option("--mode", help="Volumes: composite, mip or iso.")]
 Step = Annotated[float, typer.Option("--step", help="Volumes: distance of slices, in voxels.")]
 Rays = Annotated[str, typer.Option("--volume", help="Volumes: shared slabs for all views, or exact rays of their own.")]
-Alpha = Annotated[str, typer.Option("--alpha", help="Volumes: exact, or averaged over a pixel's three sub-pixels.")]
+Alpha = Annotated[str, typer.Option("--alpha", help="exact, or averaged or minimal over three sub-pixels.")]
+PerPass = Annotated[
+    int | None, typer.Option("--views-per-pass", metavar="N", help="geometry-shader: views that one pass draws.")
+]
+Groups = Annotated[int, typer.Option("--groups", metavar="K", help="Points by covering-quad, alpha averaged: groups.")]
+References = Annotated[int, typer.Option("--references", metavar="R", help="dibr: how many of the views are drawn.")]
 Side = Annotated[
     str, typer.Option("--from", metavar="SIDE", help="Look from the front, back, left, right, top or bottom.")
 ]

@@ -36,6 +36,9 @@ def render(
     step: common.Step = 1.0,
     volume: common.Rays = "shared",
     alpha: common.Alpha = "exact",
+    views_per_pass: common.PerPass = None,
+    groups: common.Groups = 8,
+    references: common.References = 2,
     quiet: common.Quiet = False,
 ) -> None:
     """Render scene files to the interlaced picture of a display.
@@ -55,8 +58,9 @@ def render(
 
     where = common.load_display(display, size, swap, views, continuous)
     options = Options(
-        shading=shading, lighting=lighting, sampling=sampling, samples=samples, step=step, volume=volume, alpha=alpha
-    )
+        shading=shading, lighting=lighting, sampling=sampling, samples=samples, step=step, volume=volume, alpha=alpha,
+        views_per_pass=views_per_pass, groups=groups, references=references,
+    )  # fmt: skip
     volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
     common.check_side(side, camera)
     rig = common.load_camera(camera)

@@ -47,6 +47,8 @@ def views(
     iso: common.Iso = None,
     step: common.Step = 1.0,
     volume: common.Rays = "shared",
+    views_per_pass: common.PerPass = None,
+    references: common.References = 2,
     quiet: common.Quiet = False,
 ) -> None:
     """Render the single views, from left to right.
@@ -78,8 +80,9 @@ def views(
     if suffix in ANIMATIONS:
         check_animation(output, pixels)
     options = Options(
-        shading=shading, lighting=lighting, samples=samples, depth=depth, step=step, volume=volume
-    )
+        shading=shading, lighting=lighting, samples=samples, depth=depth, step=step, volume=volume,
+        views_per_pass=views_per_pass, references=references,
+    )  # fmt: skip
     volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
     common.check_side(side, camera)
     rig = common.load_camera(camera)

@@ -51,6 +51,8 @@ class Options:
         Views: side of a square lens, world units; 0 is a pinhole. What lies in the focal plane is in focus.
     lens : (int, int)
         Samples of that lens, columns and rows, 1 … 64.
+    references : int
+        Method dibr: how many of the views are drawn; the others are warped from them.
     proxy : {"march", "slices"}
         Volumes on the OpenGL engine: a ray march, or view-aligned slices blended back to front (Hübner 2007a).
     """
@@ -65,6 +67,7 @@ class Options:
     step: float = 1.0
     views_per_pass: int | None = None
     groups: int = 8
+    references: int = 2
     proxy: str = "march"
     aperture: float = 0.0
     lens: tuple[int, int] = (4, 4)
@@ -86,7 +89,7 @@ class Options:
             raise InputError(f"options lens: expected two whole numbers from 1 to 64, got {lens!r}")
         if aperture and self.depth:
             raise InputError("options depth: means through a lens of some aperture have no one depth")
-        for name in ("views_per_pass", "groups"):
+        for name in ("views_per_pass", "groups", "references"):
             value = getattr(self, name)
             if name == "views_per_pass" and value is None:
                 continue

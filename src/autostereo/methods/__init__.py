@@ -10,12 +10,13 @@ from types import ModuleType
 
 from ..engines.engine import Engine
 from ..errors import UnsupportedError
-from . import n_pass, n_pass_subres, single_pass
+from . import dibr, n_pass, n_pass_subres, single_pass
 
 METHODS: dict[str, ModuleType] = {
     "single-pass": single_pass,
     "n-pass": n_pass,
     "n-pass-subres": n_pass_subres,
+    "dibr": dibr,
 }
 
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...display.display import Display
+from ...engines.options import Options
 from ...scene.scene import Scene
 from ...scene.shapes import uv_sphere
 from . import workloads
@@ -16,10 +17,13 @@ from .harness import Bar, Figure
 from .papers_mesh import sphere
 from .papers_published import FASTER_FROM_2020, HEADLINE_2020, MULTIPLICATIONS_2020
 from .papers_studio import PapersStudio, Way, on_cpu
+from .volume import psnr
 
 ONE, N_TIMES = "plane-rasterizer", "plane-rasterizer-n-pass"
 PANEL = (1024, 768)
 ATTRIBUTES = 9
+REFERENCES = (2, 4)  # views that are drawn, and others warped from
+MDIBR = "of the panel; the paper's chart has no printed values"
 SENT = Bar(0, at_least=False)
 
 
@@ -58,8 +62,9 @@ def rates_by_views(studio: PapersStudio, name: str, lighting: str) -> list[Figur
     scene, size = Scene((sphere(studio, 6),)), studio.size(*PANEL)
     rig, display = workloads.rig_for(scene, views, size), panel(size, views)
     ways = [Way(ONE, display, rig, ONE), Way("single-pass by triangles", display, rig), on_cpu(Way("", display, rig))]
-    if views == 8:
-        ways.append(Way("dibr", display, rig, "dibr"))
+    counts = [n for n in REFERENCES if n < views]
+    warped = [Way(f"dibr, {n} references", display, rig, "dibr", options=Options(references=n)) for n in counts]
+    ways += warped
     left_out = views > 48 and studio.too_slow(work)
     if not left_out:
         ways.append(Way(N_TIMES, display, rig, N_TIMES))
@@ -68,7 +73,15 @@ def rates_by_views(studio: PapersStudio, name: str, lighting: str) -> list[Figur
         row.refused[N_TIMES] = f"left out without a GPU; --only {work} measures it"
     bar = None if left_out or views < 8 else Bar(3.0) if views >= 48 else Bar(1.0)
     note = f"same pipeline, view by view; the paper: ahead above {FASTER_FROM_2020} views"
-    return [*row.rates(), row.ratio(N_TIMES, ONE, bar, note)]
+    return [*row.rates(), row.ratio(N_TIMES, ONE, bar, note), *(fidelity(studio, work, name, scene, w) for w in warped)]
+
+
+def fidelity(studio: PapersStudio, work: str, name: str, scene: Scene, way: Way) -> Figure:
+    """PSNR of a way's panel against the one in which every sub-pixel is drawn."""
+    picture, reason = studio.picture_or_why(scene, way)
+    exact, why = studio.picture_or_why(scene, replace(way, method="single-pass", options=Options()))
+    value = math.nan if picture is None or exact is None else psnr(picture, exact)
+    return Figure(work, f"PSNR of {way.name}", *(value,) * 3, "dB", name, note=reason or why or MDIBR)
 
 
 def headline(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:

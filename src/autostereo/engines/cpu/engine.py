@@ -46,7 +46,7 @@ class CpuEngine:
     """
 
     name = "cpu"
-    methods = ("single-pass", "n-pass", "n-pass-subres")
+    methods = ("single-pass", "n-pass", "n-pass-subres", "dibr")
 
     def prepare(self, scene: Scene) -> Prepared:
         """Turn every kind of primitive into arrays."""

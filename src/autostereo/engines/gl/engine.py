@@ -90,12 +90,12 @@ class GlEngine:
     @property
     def methods(self) -> tuple[str, ...]:
         """Names of the methods that some kind of object can be drawn by."""
-        return tuple(dict.fromkeys(name for names in METHODS.values() for name in names))
+        return (*self.own_methods, "dibr")
 
     @property
     def own_methods(self) -> tuple[str, ...]:
-        """All of them: whole panels and stacks are made on the device, and read back once."""
-        return self.methods
+        """Those by which whole panels and stacks are made on the device, and read back once."""
+        return tuple(dict.fromkeys(name for names in METHODS.values() for name in names))
 
     def prepare(self, scene: Scene) -> Prepared:
         """Send a scene to the device.

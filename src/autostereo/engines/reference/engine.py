@@ -35,7 +35,7 @@ class ReferenceEngine:
     """
 
     name = "reference"
-    methods: tuple[str, ...] = ("single-pass", "n-pass", "n-pass-subres")
+    methods: tuple[str, ...] = ("single-pass", "n-pass", "n-pass-subres", "dibr")
 
     def prepare(self, scene: Scene) -> PreparedScene:
         """Bring all objects into world space.
