@@ -83,7 +83,14 @@ def test_every_work_has_figures_of_every_scene(measured, work):
 def test_nothing_failed_and_only_what_the_engine_lacks_is_not_available(measured):
     refused = {(f["work"], f["measure"]) for f in measured.results if f["value"] is None}
     immediate = {("2007b-immediate", "MV of SV"), ("2007b-immediate", "GPU-MV of SV")}
-    assert refused == {("2020-fig15", "dibr"), *immediate}
+    assert refused == immediate
+
+
+def test_depth_image_based_rendering_has_its_rate_and_its_fidelity(measured):
+    for views in ("8 views", "48 views"):
+        for count in (2, 4):
+            assert found(measured, "2020-fig15", views, f"dibr, {count} references")["value"] > 0
+            assert 25 < found(measured, "2020-fig15", views, f"PSNR of dibr, {count} references")["value"] < 90
 
 
 def test_ours_stands_beside_what_is_printed(measured):

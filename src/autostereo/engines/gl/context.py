@@ -40,6 +40,7 @@ class Limits:
     uniform_block: int
     draw_buffers: int
     geometry_vertices: int
+    vertex_buffers: int
 
 
 @dataclass(eq=False)
@@ -211,6 +212,7 @@ def _make() -> Device:
         uniform_block=info["GL_MAX_UNIFORM_BLOCK_SIZE"],
         draw_buffers=info["GL_MAX_DRAW_BUFFERS"],
         geometry_vertices=info["GL_MAX_GEOMETRY_OUTPUT_VERTICES"],
+        vertex_buffers=info.get("GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS", 0),
     )
     device = Device(ctx, ctx.version_code, info["GL_RENDERER"], limits)
     _release_current()

@@ -79,14 +79,26 @@ class Programs:
         ShaderError
             The driver does not compile or link it.
         UnsupportedError
-            The context's OpenGL is older than `version`.
+            The context's OpenGL is older than `version`, or its vertex shaders read too few storage buffers.
         """
         key = (names, tuple(sorted((defines or {}).items())), version)
         if key not in self._made:
             self._device.require(version, f"the shader {names[-1]}")
             texts = {name: source(name, defines, version) for name in names}
+            self._check_vertex_buffers(texts)
             self._made[key] = self.compile(texts)
         return self._made[key]
+
+    def _check_vertex_buffers(self, texts: Mapping[str, str]) -> None:
+        """Vertex shaders may have no storage buffers at all, by OpenGL 4.3; nearly all devices have eight or more."""
+        most, renderer = self._device.limits.vertex_buffers, self._device.renderer
+        for name, text in texts.items():
+            count = text.count("layout(std430") if name.endswith(".vert") else 0
+            if count > most:
+                raise UnsupportedError(
+                    f"the shader {name} needs {count} storage buffers, vertex shaders of {renderer} have {most}: "
+                    "choose another method or engine='cpu'"
+                )
 
     def compile(self, texts: Mapping[str, str]) -> Any:
         """Compile completed texts by file name, without keeping the result; `get` is the usual way."""

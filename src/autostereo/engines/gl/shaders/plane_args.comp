@@ -1,8 +1,5 @@
 // Between the stages of the plane rasteriser: sizes of the next dispatches, from the counts of the last.
-#include "lib/frame.glsl"
-#include "lib/plane_memory.glsl"
-#include "lib/plane_triangle.glsl"
-#include "lib/plane_tile.glsl"
+#include "lib/plane_pass.glsl"
 
 layout(local_size_x = 1) in;
 

@@ -2,6 +2,12 @@
 //
 // Only what is seen is shaded, of a panel only its sub-pixels. The weights are those of quad.vert, of the whole
 // triangle in eye space, perspective-correct also where it was clipped. Switches: PANEL, and those of lib/surface.glsl.
+#define DEPTHS
+#define WINNERS
+#define POINTS
+#ifdef PANEL
+#define CAMERA_OFFSET
+#endif
 #define COLORING
 #define MIXING
 #include "lib/frame.glsl"

@@ -1,7 +1,18 @@
 // Stage 3: the fine rasteriser, an invocation per tile of the queue. The first round leaves its coverage mask for the second.
+#define TRIANGLES
+#define ENTRIES
+#define DEPTHS
+#define WINNERS
+#ifdef PANEL
+#define SHOWN
+#define CAMERA_OFFSET
+#else
+#define BLOCKS
+#endif
 #include "lib/frame.glsl"
 #include "lib/plane_memory.glsl"
 #include "lib/plane_triangle.glsl"
+#include "lib/plane_pass.glsl"
 #include "lib/plane_tile.glsl"
 
 layout(local_size_x = 64) in;

@@ -1,8 +1,10 @@
 // Stage 1: primitive setup (PMR 2020, section 4.1): clip at the near plane, project, snap, cull over the union of all views.
+#define TRIANGLES
+#define POINTS
 #include "lib/frame.glsl"
 #include "lib/plane_memory.glsl"
 #include "lib/plane_triangle.glsl"
-#include "lib/plane_tile.glsl"
+#include "lib/plane_pass.glsl"
 
 layout(local_size_x = 64) in;
 

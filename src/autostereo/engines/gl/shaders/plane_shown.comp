@@ -1,4 +1,6 @@
 // Which sub-pixels of each tile of a panel show which block of views, and every sub-pixel's camera offset.
+#define SHOWN
+#define CAMERA_OFFSET
 #include "lib/frame.glsl"
 #include "lib/plane_memory.glsl"
 #include "lib/viewmap.glsl"

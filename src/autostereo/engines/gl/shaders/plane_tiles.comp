@@ -4,9 +4,19 @@
 // mask. First those within the triangle's box in each block of views, which slides with the parallax, then, if there are
 // many, those not wholly outside one of the three side faces. Tiles go to the queue; one that finds no room there is
 // rasterised at once, and `everything` repeats that for the second round.
+#define TRIANGLES
+#define ENTRIES
+#define DEPTHS
+#define WINNERS
+#ifdef PANEL
+#define SHOWN
+#define CAMERA_OFFSET
+#endif
+#define BLOCKS
 #include "lib/frame.glsl"
 #include "lib/plane_memory.glsl"
 #include "lib/plane_triangle.glsl"
+#include "lib/plane_pass.glsl"
 #include "lib/plane_tile.glsl"
 
 layout(local_size_x = 64) in;

@@ -1,4 +1,5 @@
 // Stage 0 of the plane rasteriser: a mesh's vertices in eye space, once for all views.
+#define POINTS
 #include "lib/frame.glsl"
 #include "lib/shading.glsl"
 #include "lib/surface.glsl"

@@ -1,14 +1,32 @@
 // The plane rasteriser's arrays. They are pictures of MEMORY_WIDTH columns, element i at place_of(i): software devices
 // read these several times faster than storage buffers. Made by plane_buffers.py.
+//
+// Switches: those that a stage uses, as devices may have eight images a stage and no more.
 
+#ifdef TRIANGLES
 layout(rgba32f, binding = 0) uniform image2D triangles;    // four texels each: lib/plane_triangle.glsl
+#endif
+#ifdef ENTRIES
 layout(rgba32ui, binding = 1) uniform uimage2D entries;    // triangle; tile's column, row, block in 12, 12, 8 bits; coverage
+#endif
+#ifdef DEPTHS
 layout(r32ui, binding = 2) uniform uimage2D depths;        // per voxel, or sub-pixel: bits of window depth
+#endif
+#ifdef WINNERS
 layout(r32ui, binding = 3) uniform uimage2D winners;       // number of the triangle that is seen
+#endif
+#ifdef SHOWN
 layout(rg32ui, binding = 4) uniform uimage2D shown;        // per tile of a panel and block: bits c*16 + y*4 + x
+#endif
+#ifdef CAMERA_OFFSET
 layout(r32f, binding = 5) uniform image2D camera_offset;   // per sub-pixel of a panel
+#endif
+#ifdef POINTS
 layout(rgba32f, binding = 6) uniform image2D points;       // vertices in eye space
+#endif
+#ifdef BLOCKS
 layout(rgba32f, binding = 7) uniform image2D blocks;       // row b: offsets of its views; least and greatest
+#endif
 
 ivec2 place_of(uint i) {
     return ivec2(i % MEMORY_WIDTH, i / MEMORY_WIDTH);

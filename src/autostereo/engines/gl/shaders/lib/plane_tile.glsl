@@ -1,25 +1,12 @@
 // The fine rasteriser: a tile of 4 x 4 pixels and up to 4 views, voxel by voxel (PMR 2020, section 4.3).
 //
 // There are two rounds, as not every device has atomic operations of 64 bits: `find_depth` leaves the least depth in every
-// voxel, the next round the first triangle of that depth. Needs frame.glsl, plane_memory.glsl, plane_triangle.glsl.
+// voxel, the next round the first triangle of that depth. Needs frame.glsl, plane_memory.glsl, plane_triangle.glsl,
+// plane_pass.glsl.
 //
 // Switches: PANEL: what counts are not voxels but the sub-pixels of a panel, each of which shows one camera; STAGGER: triangles
 // begin with different views, so that at one time they change different addresses (section 4.3).
 
-layout(std430, binding = 0) buffer Counters {
-    uint small_triangles;     // from the front of the triangles
-    uint large_triangles;     // from their end
-    uint entry_count;         // asked for, also beyond the room there is
-    uint most_entries;        // that a pass asked for since last read
-    uint unused[4];
-    uint dispatch[5 * 3];     // tiles of small, of large triangles; entries; small, large triangles once more
-};
-
-uniform ivec2 picture;     // width; rows of this round
-uniform int first_row;     // of this round
-uniform ivec4 pass_views;  // first block, blocks of this pass; views per block; views in all
-uniform vec4 sample_at;    // where in a pixel samples are: x of three channels, y
-uniform ivec2 planes;      // first channel and how many of them
 uniform bool find_depth;
 
 Triangle triangle_at(uint slot) {
@@ -173,8 +160,3 @@ void put_tile(Triangle t, ivec3 tile, uvec2 mask) {
     }
 }
 #endif
-
-// Number of this invocation in a dispatch whose size has been spread over x and y.
-uint invocation() {
-    return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
-}
