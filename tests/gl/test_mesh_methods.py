@@ -120,7 +120,10 @@ def test_views_that_one_atlas_cannot_hold_are_spread_over_several(monkeypatch):
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_views_of_an_atlas_are_the_frames_of_single_cameras(scene):
-    """Tiles are cut where pictures end, and lie elsewhere: silhouettes may round differently, nothing else."""
+    """Tiles are cut where pictures end, and lie elsewhere: silhouettes may round differently, nothing else.
+
+    GPUs snap corners to 1/256 of a pixel where tiles lie, which moves the depths of what is seen nearly from its edge.
+    """
     thing, by = SCENES[scene]
     stack = views(thing, RIG, "single-pass")
     alone = [views(thing, replace(RIG, offsets=(v,), views=1), "single-pass") for v in RIG.camera_offsets]
@@ -129,7 +132,7 @@ def test_views_of_an_atlas_are_the_frames_of_single_cameras(scene):
     inside = interior_of_views(thing, RIG, SIZE, 1, by)
     assert difference[inside].max() <= 1
     assert (difference > 1).mean() <= SILHOUETTE
-    np.testing.assert_allclose(stack.depth[inside], depth[inside], rtol=1e-4)
+    np.testing.assert_allclose(stack.depth[inside], depth[inside], rtol=2e-3 if need_device().is_hardware else 1e-4)
 
 
 def test_a_single_pass_takes_the_cheaper_way():
