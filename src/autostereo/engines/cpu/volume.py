@@ -38,8 +38,7 @@ from .volume_shared import LINE, SLAB_ROWS, SPAN, Shared
 from .volume_views import ISO, MIP, Ways, draw_rows, draw_shared_rows
 
 MODES = ("composite", "mip", "iso")  # in the order of volume_views
-FINE = (1 / 8, 1 / 3)  # of a voxel: least and greatest distance of samples on a slice
-PER_PIXEL = 1.4  # distance of samples on a slice, in pixels of the nearest one
+RUN_STEP = 0.5  # voxels, a sixteenth of a run
 FINE_VIEWS = (1, 8, 3)  # positions of a shared slab: least and most per pixel, and per voxel between them
 
 
@@ -84,16 +83,13 @@ def gradient_turn(camera: Camera, volume: Volume) -> NDArray[np.float32]:
     return (turn / np.abs(turn).max()).astype(np.float32)
 
 
-def make_cut(
-    prepared: PreparedVolumes, index: int, draw: Draw, slices: Slices, shared: bool, memory: Memory
-) -> tuple[Cut, Ways]:
+def make_cut(prepared: PreparedVolumes, index: int, draw: Draw, slices: Slices, memory: Memory) -> tuple[Cut, Ways]:
     """How volume `index` is cut, lit and classified in this frame."""
     f, camera = prepared.fields[index], draw.camera
     volume = f.volume
     index_from_eye = np.linalg.inv(camera.eye_from_world @ volume.world_from_index)
     along = float(np.abs(index_from_eye[:3, 0]).max())  # voxels per unit of X
-    fine = FINE if shared else (0.5, 0.5)  # rays of their own need but the runs
-    step = float(np.clip(PER_PIXEL * slices.first / camera.fx, fine[0] / along, fine[1] / along))
+    step = RUN_STEP / along
     x = (camera.eye_from_world @ np.column_stack([volume.corners, np.ones(8)]).T)[0]
     first = float(x.min()) - 2.0 * step
     reach = int(np.ceil((8 * step * along + 1 + slices.distance * np.abs(index_from_eye[:3, 2]).max()) / (1 << BLOCK)))
@@ -154,7 +150,7 @@ def make_cut(
 
 
 def samples_of(prepared: PreparedVolumes, index: int, camera: Camera, cut: Cut) -> int:
-    """Samples of a slice, in whole runs."""
+    """Steps across a slice, in whole runs."""
     x = (camera.eye_from_world @ np.column_stack([prepared.fields[index].volume.corners, np.ones(8)]).T)[0]
     return (int((float(x.max()) - cut.first) / cut.step) + 4 + (1 << CHUNK)) >> CHUNK << CHUNK
 
@@ -163,8 +159,6 @@ def new_planes(samples: int, slices: Slices) -> Planes:
     """One thread's memory for slices."""
     runs = samples >> CHUNK
     return Planes(
-        np.zeros((SLABS + 1, samples + 1), np.float32),
-        np.zeros((slices.slabs + 1, runs), np.uint8),
         np.zeros((slices.slabs + 1, runs), np.uint8),
         np.zeros(runs, np.uint8),
         np.zeros(LIST, np.int32),
@@ -219,7 +213,7 @@ def draw_volume_views(
         if may_share and is_shared(prepared, group, options):
             _draw_shared(prepared, group[0], draw, slices, color, memory)
             continue
-        made = [make_cut(prepared, index, draw, slices, False, memory) for index in group]
+        made = [make_cut(prepared, index, draw, slices, memory) for index in group]
         cuts, ways = tuple(cut for cut, _ in made), tuple(way for _, way in made)
         counts = [samples_of(prepared, index, camera, cut) for index, cut in zip(group, cuts, strict=True)]
         pool = memory.pool((("volume rays", *group), *counts, slices.slabs), partial(new_rays, counts, slices))
@@ -252,7 +246,7 @@ def _draw_shared(
     """Draw volume `index` from slabs that all views share, over color (V, H, W, 4)."""
     camera, offsets = draw.camera, draw.offsets
     numbers, slices = camera_numbers(camera), share_slices(slices, camera, offsets, SLIDE[0])
-    cut, ways = make_cut(prepared, index, draw, slices, True, memory)
+    cut, ways = make_cut(prepared, index, draw, slices, memory)
     samples = samples_of(prepared, index, camera, cut)
     pixel = slices.first / camera.fx * float(np.abs(cut.from_eye[:, 0]).max())  # of the nearest one, in voxels
     fine = int(np.clip(np.ceil(FINE_VIEWS[2] * pixel), FINE_VIEWS[0], FINE_VIEWS[1]))
@@ -310,7 +304,7 @@ def draw_volume_panel(
     for group in volume_groups(prepared, opaque):
         shared = may_share and is_shared(prepared, group, options)
         own = share_slices(slices, camera, reach, SLIDE[1]) if shared else slices
-        made = [make_cut(prepared, index, draw, own, shared, memory) for index in group]
+        made = [make_cut(prepared, index, draw, own, memory) for index in group]
         cuts, ways = tuple(cut for cut, _ in made), tuple(way for _, way in made)
         counts = [samples_of(prepared, index, camera, cut) for index, cut in zip(group, cuts, strict=True)]
         pool = _panel_pool(group, counts, draw, own, plan if shared else None, memory)

@@ -14,7 +14,7 @@ from .simd import adjacent
 from .volume_rays import END, HALF, HIDDEN, LENGTH, ONE, ORIGIN, RAYS, ROW, TURN, ZERO, B, G, R, T, mix_pair
 from .volume_sample import SLABS, hide_runs, keep_alive, mark_runs
 from .volume_shared import ALPHA, LINE, SLAB_ROWS, SPAN, classify_slabs, shift_of
-from .volume_views import PIXELS, mark_volumes, next_slices, over, trace_rays
+from .volume_views import PIXELS, mark_volumes, over, trace_rays
 
 AT, MOVE, SHARE_R, CUT_R, A0, C0, SUM, THROUGH = (np.uint64(k * ROW) for k in range(8))
 PIXEL_ROWS = 8
@@ -135,7 +135,7 @@ def draw_panel_rows(rows, cut, camera, slices, ways, panel, averaged, planes, sh
     middle = slices.first + 0.5 * slices.slabs * slices.distance
     for r in range(rows[0], rows[1]):
         row = ((camera.centre_y - (r + 0.5)) / camera.fy - camera.offset_y / camera.focal, camera.offset_y)
-        if mark_runs(cut, row, slices, planes.marks, planes.wanted) == 0:
+        if mark_runs(cut, row, slices, planes.marks) == 0:
             continue
         shown = height - 1 - r if panel.flip_y else r
         row_offsets(shown, width, panel.flip_x, (0, width), 0, 0, width, panel.plan, u, offsets)
@@ -152,7 +152,6 @@ def draw_panel_rows(rows, cut, camera, slices, ways, panel, averaged, planes, sh
             last = min(k + SLABS, slices.slabs)
             if k > 0:
                 hide_behind_panel(width, offsets, camera, cut, slices, k, last, planes, pixels)
-            next_slices(cut, row, slices, k, last, planes)
             args = (ways.table, ways.material, ways.light, planes, shared, rays, index)
             classify_slabs(cut, camera, row, slices, k, last, *args)
             blend_pixels(blocks, averaged, camera, slices, k, last, shared, pixels, index, planes.place)

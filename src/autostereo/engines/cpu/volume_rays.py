@@ -11,7 +11,7 @@ import numpy as np
 
 from .jit import inlined, lean
 from .scalars import exp2_fast, log2_fast, whole_steps
-from .simd import LANES, adjacent, append, iota, load
+from .simd import LANES, append, iota, load
 from .volume_sample import (
     AT,
     EYE,
@@ -31,9 +31,9 @@ RAYS = 128  # of a block
 ROW = 144  # distance of a block's rows
 (
     ORIGIN, TURN, ENTER, LEAVE, LENGTH, T, R, G, B, HALF, FRONT, BACK, OPTICAL, SHARE,
-    PART, END, LIT, TOTAL, DONE, KEPT,
-) = (np.uint64(k * ROW) for k in (*range(17), 22, 23, 24))  # fmt: skip
-BLOCK_ROWS = 25
+    END, LIT, TOTAL, DONE, KEPT,
+) = (np.uint64(k * ROW) for k in (*range(16), 21, 22, 23))  # fmt: skip
+BLOCK_ROWS = 24
 ZERO, ONE, HALF_WAY = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 TEN_BITS, COLOR_STEP = np.int32(1023), np.float32(1.0 / 1023.0)
 OPAQUE = 128  # transmittance in 65536ths, below which a ray has seen enough
@@ -69,19 +69,6 @@ def ray_stretch(n, base, cut, row, near, rays):
 
 
 @inlined
-def locate_rays(n, base, depth, cut, samples, rays, index):
-    """Where a slice's samples lie beside the rays: the left one, and the part beyond it in PART."""
-    last, inverse = np.float32(samples - 2), np.float32(1.0 / cut.step)
-    first, d = np.float32(-cut.first / cut.step), np.float32(depth)
-    for i in range(n):
-        at = (rays[base + ORIGIN + i] + d * rays[base + TURN + i]) * inverse + first
-        at = min(max(at, ZERO), last)
-        k = np.floor(at)
-        rays[base + PART + i] = at - k
-        index[i] = np.int32(k)
-
-
-@inlined
 def lower_half(pair):
     """The first of two float32 that `simd.adjacent` brought."""
     return np.int32(pair & np.int64(0xFFFFFFFF)).view(np.float32)
@@ -92,16 +79,6 @@ def mix_pair(pair, part):
     """Between two float32 that `simd.adjacent` brought."""
     left = lower_half(pair)
     return left + part * (np.int32(pair >> np.int64(32)).view(np.float32) - left)
-
-
-@inlined
-def sample_grid(n, base, depth, cut, values, scalar, pairs, rays, index):
-    """Scalars of a sampled slice, values (J,), interpolated beside the rays, into row `scalar`."""
-    locate_rays(n, base, depth, cut, values.shape[0], rays, index)
-    for i in range(n):
-        pairs[i] = adjacent(values, np.uint64(index[i]))
-    for i in range(n):
-        rays[base + scalar + i] = mix_pair(pairs[i], rays[base + PART + i])
 
 
 @lean

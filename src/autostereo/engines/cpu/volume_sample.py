@@ -1,9 +1,8 @@
-"""One image row of a volume: all rays of all views lie in one plane, on which the volume is sampled once.
+"""Samples of a volume where rays cross a slice: scalars, gradients, light; and which stretches show anything.
 
-The plane is cut by slices of constant eye depth d_k, the same for all views (Hübner 2007a, section 3.2). On each
-slice scalars are interpolated trilinearly at evenly spaced X, a quarter to half of a voxel apart; whatever a ray of any
-view needs is then an interpolation between two neighbours. Runs of 16 samples in which no block of voxels shows
-anything get one scalar each. Gradients are interpolated and lit only where something is seen.
+All rays of all views of an image row lie in one plane, cut by slices of constant eye depth d_k, the same for all views
+(Hübner 2007a, section 3.2). On a slice rows of the volume are straight, so a sample is found from its X alone. Runs
+of 16 half voxels in which no block of voxels shows anything are left out; gradients are lit where something is seen.
 """
 
 from __future__ import annotations
@@ -20,7 +19,6 @@ from .volume_setup import BLOCK, TABLE
 CHUNK = 4  # log2 of samples in a run
 SLABS = 16  # slabs between slices that are handled together
 LIST = 272  # room for the samples that are handled at once
-AT_ONCE = 256
 AT, EYE, PX, PY, PZ, VALUE, NX, NY, NZ, DIFFUSE, SHINE, LIGHT = (np.uint64(k * LIST) for k in range(12))
 LIST_ROWS = 18
 W0, W1, W2, W3, W4, W5, W6, W7 = (np.uint64(k * LIST) for k in range(8))
@@ -32,7 +30,7 @@ class Cut(NamedTuple):
     """How a volume is cut by the slices.
 
     scalars, words, shape: see volume_setup; from_eye (3, 4) float64: index coordinates of (X, Y, depth, 1); halves (K,
-    4): half-spaces in index space; shown: blocks; first, step: X of the first sample and from sample to sample; low,
+    4): half-spaces in index space; shown: blocks; first, step: X where runs begin, and a sixteenth of a run; low,
     scale: what makes a scalar a row of the table; turn (3, 3) float32: of gradients, from object to eye space; lights:
     see scene_arrays.light_array; channels of light that samples get, and colours among them: diffuse, one or for each
     colour one, then as many for the highlight if there is one; neutral: diffuse light that leaves a colour as it is;
@@ -62,14 +60,11 @@ class Cut(NamedTuple):
 class Planes(NamedTuple):
     """One thread's memory for the slices at hand.
 
-    values (SLABS + 1, J) float32: table rows; marks, wanted (all slices, J / 16) uint8: runs in which something shows,
-    and runs that are to be sampled; alive (J / 16,) uint8: runs that are not yet hidden; chosen (LIST,) int32: rays
-    that are lit; place (LIST,) int64, words int32, lists float32: scratch for the samples of a run.
+    marks (slices, N) uint8: runs in which something shows; alive (N,) uint8: runs that are not yet hidden; chosen
+    (LIST,) int32: rays that are lit; place (LIST,) int64, words int32, lists float32: scratch for samples.
     """
 
-    values: np.ndarray
     marks: np.ndarray
-    wanted: np.ndarray
     alive: np.ndarray
     chosen: np.ndarray
     place: np.ndarray
@@ -90,8 +85,8 @@ def on_slice(cut, row, depth):
 
 
 @lean
-def mark_runs(cut, row, slices, marks, wanted):
-    """Mark the runs of every slice in which a block shows something, and those and their neighbours as wanted.
+def mark_runs(cut, row, slices, marks):
+    """Mark the runs of every slice in which a block shows something.
 
     Returns how many are marked.
     """
@@ -101,7 +96,6 @@ def mark_runs(cut, row, slices, marks, wanted):
     m = cut.from_eye
     margin = (abs(m[0, 0]) * half + 1.0, abs(m[1, 0]) * half + 1.0, abs(m[2, 0]) * half + 1.0)
     nx, ny, nz = cut.shape[0], cut.shape[1], cut.shape[2]
-    wanted[: slices.slabs + 1] = 0
     for k in range(slices.slabs + 1):
         x0, y0, z0 = on_slice(cut, row, slices.first + k * slices.distance)
         for c in range(runs):
@@ -124,9 +118,6 @@ def mark_runs(cut, row, slices, marks, wanted):
             marks[k, c] = np.uint8(shows)
             if shows:
                 marked += 1
-                for b in range(max(k - 1, 0), min(k + 2, slices.slabs + 1)):
-                    for a in range(max(c - 1, 0), min(c + 2, runs)):
-                        wanted[b, a] = np.uint8(1)
     return marked
 
 
@@ -306,37 +297,6 @@ def light_points(n, cut, y, depth, start, place, words, lists):
     light_samples(n, cut, y, depth, lists)
 
 
-@lean
-def sample_slice(cut, row, slices, k, planes, into):
-    """Sample slice k into planes.values[into]; unwanted runs get the scalar of their middle."""
-    runs = planes.wanted.shape[1]
-    depth = slices.first + k * slices.distance
-    start = on_slice(cut, row, depth)
-    values, place, lists = planes.values, planes.place, planes.lists
-    m = cut.from_eye
-    c = 0
-    while c < runs:
-        end, wanted = c + 1, planes.wanted[k, c]
-        while wanted != 0 and end < min(runs, c + (AT_ONCE >> CHUNK)) and planes.wanted[k, end] != 0:
-            end += 1
-        j = c << CHUNK
-        n = np.uint64((end - c) << CHUNK)
-        first, step = np.float32(cut.first + j * cut.step), np.float32(cut.step)
-        if wanted == 0:
-            lists[AT] = first + np.float32(1 << (CHUNK - 1)) * step
-            locate(np.uint64(1), start, (m[0, 0], m[1, 0], m[2, 0]), cut.shape, place, lists)
-            value = np.float32((np.float64(cut.scalars[np.uint64(place[0])]) - cut.low) * cut.scale)
-            values[into, j : j + (1 << CHUNK)] = min(max(value, ZERO), LAST_ROW)
-        else:
-            for i in range(n):
-                lists[AT + i] = first + np.float32(i) * step
-            scalar_points(n, cut, start, place, planes.words, lists)
-            line = values[into, j:]
-            for i in range(n):
-                line[i] = lists[VALUE + i]
-        c = end
-
-
 @inlined
 def any_marked(marks, k, first, last):
     """Whether a run of slice k between samples first … last is marked."""
@@ -362,4 +322,3 @@ def hide_runs(first, last, planes):
     for k in range(first, last + 1):
         for c in range(planes.alive.shape[0]):
             planes.marks[k, c] &= planes.alive[c]
-            planes.wanted[k, c] &= planes.alive[c]

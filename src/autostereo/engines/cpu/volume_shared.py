@@ -40,7 +40,7 @@ from .volume_rays import (
     classify,
     light_slab,
     ray_stretch,
-    sample_grid,
+    sample_volume,
     seen,
     share_of_slab,
     trim_ends,
@@ -99,8 +99,8 @@ def note_shown(base, shown, slab, group, rays):
     """Note in which spans of a group of positions a slab is seen: SHARE is its opacity."""
     for part in range(RAYS // SPAN):
         first, seen = base + SHARE + np.uint64(part * SPAN), np.int32(0)
-        for i in range(np.uint64(SPAN)):
-            seen |= np.int32(rays[first + i] > ZERO)
+        for i in range(np.uint64(0), np.uint64(SPAN), np.uint64(LANES)):
+            seen |= mask_word(load(rays, first + i) > ZERO)
         if seen != 0:
             shown[slab, group * (RAYS // SPAN) + part] = np.uint8(1)
 
@@ -134,8 +134,8 @@ def classify_slabs(cut, camera, row, slices, first, last, table, material, light
                             shared.values[clear + i] = ZERO
                     continue
                 if not fresh:
-                    sample_grid(n, base, depth, cut, planes.values[k - first], FRONT, planes.place, rays, packed)
-                sample_grid(n, base, after, cut, planes.values[k - first + 1], BACK, planes.place, rays, packed)
+                    sample_volume(n, base, depth, cut, row, planes, FRONT, rays)
+                sample_volume(n, base, after, cut, row, planes, BACK, rays)
                 share_of_slab(n, base, depth, slices.distance, rays)
                 trim_ends(n, base, cut, row, depth, slices.distance, rays)
                 classify(n, base, table, planes.place, rays, packed)

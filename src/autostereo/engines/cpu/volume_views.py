@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined, kernel, lean
-from .simd import LANES, greater, lesser, load, splat, store, to_float, to_int
+from .simd import LANES, greater, lesser, load, mask_word, splat, store, to_float, to_int
 from .volume_modes import NONE, march_iso, march_mip, resolve_iso, resolve_mip
 from .volume_rays import (
     DONE,
@@ -32,7 +32,7 @@ from .volume_rays import (
     march,
     ray_stretch,
 )
-from .volume_sample import SLABS, TINY, hide_runs, keep_alive, mark_runs, sample_slice
+from .volume_sample import SLABS, TINY, hide_runs, keep_alive, mark_runs
 from .volume_shared import ALPHA, LINE, SLAB_ROWS, blend_view, classify_slabs, clear_line, even_out, load_sums
 
 COMPOSITE, MIP, ISO = 0, 1, 2
@@ -163,23 +163,11 @@ def finish_rays(n, base, rays, color):
 
 
 @lean
-def next_slices(cut, row, slices, first, last, planes):
-    """Sample the slices of slabs first … last; that of the slabs before is at hand unless first is 0."""
-    begin = first
-    if first > 0:
-        for j in range(planes.values.shape[1]):
-            planes.values[0, j] = planes.values[SLABS, j]
-        begin = first + 1
-    for k in range(begin, last + 1):
-        sample_slice(cut, row, slices, k, planes, k - first)
-
-
-@lean
 def mark_volumes(cuts, row, slices, planes):
     """Mark the runs of all volumes; returns how many there are."""
     marked = 0
     for v in range(len(cuts)):
-        marked += mark_runs(cuts[v], row, slices, planes[v].marks, planes[v].wanted)
+        marked += mark_runs(cuts[v], row, slices, planes[v].marks)
     return marked
 
 
@@ -256,10 +244,10 @@ def hide_behind_views(views, width, offsets, camera, cut, slices, k, last, plane
     for v in range(views):
         t = np.uint64(v * SLAB_ROWS * LINE) + ALPHA
         for x in range(0, width, RAYS):
-            pixels, dark = min(RAYS, width - x), True
-            for i in range(x, x + pixels):
-                dark = dark and line[t + np.uint64(i)] < HIDDEN
-            if not dark:
+            pixels, lit = min(RAYS, width - x), np.int32(0)
+            for i in range(x, x + pixels, LANES):  # a few beyond the picture are as good as those in it
+                lit |= mask_word(load(line, t + np.uint64(i)) >= HIDDEN)
+            if lit != 0:
                 keep_group(x, pixels, offsets[v], near, far, camera, cut, planes.alive)
     hide_runs(k, last, planes)
 
@@ -272,7 +260,7 @@ def draw_shared_rows(rows, cut, camera, slices, ways, offsets, planes, shared, r
     for r in range(rows[0], rows[1]):
         slope = (camera.centre_y - (r + 0.5)) / camera.fy - camera.offset_y / camera.focal
         row = (slope, camera.offset_y)
-        if mark_runs(cut, row, slices, planes.marks, planes.wanted) == 0:
+        if mark_runs(cut, row, slices, planes.marks) == 0:
             continue
         for v in range(views):
             clear_line(np.uint64(width), np.uint64(v * SLAB_ROWS * LINE), line)
@@ -280,7 +268,6 @@ def draw_shared_rows(rows, cut, camera, slices, ways, offsets, planes, shared, r
             last = min(k + SLABS, slices.slabs)
             if k > 0:
                 hide_behind_views(views, width, offsets, camera, cut, slices, k, last, planes, line)
-            next_slices(cut, row, slices, k, last, planes)
             args = (ways.table, ways.material, ways.light, planes, shared, rays, packed)
             classify_slabs(cut, camera, row, slices, k, last, *args)
             for v in range(views):
