@@ -13,7 +13,7 @@ from .scalars import exp2_fast, log2_fast
 from .simd import adjacent
 from .volume_rays import END, HALF, HIDDEN, LENGTH, ONE, ORIGIN, RAYS, ROW, TURN, ZERO, B, G, R, T, mix_pair
 from .volume_sample import SLABS, hide_runs, keep_alive, mark_runs
-from .volume_shared import ALPHA, LINE, SLAB_ROWS, SPAN, classify_slabs, shift_of
+from .volume_shared import LESS, LINE, SLAB_ROWS, SPAN, classify_slabs, shift_of
 from .volume_views import PIXELS, mark_volumes, over, trace_rays
 
 AT, MOVE, SHARE_R, CUT_R, A0, C0, SUM, THROUGH = (np.uint64(k * ROW) for k in range(8))
@@ -23,7 +23,7 @@ THIRD = np.float32(1.0 / 3.0)
 
 @inlined
 def fetch_pixels(n, base, slab, channel, last, values, pixels, index, pairs):
-    """One channel and the opacity of a slab at the places AT − MOVE·shift of sub-pixels; AT holds the place itself."""
+    """One channel and LESS of a slab at the places AT − MOVE·shift of sub-pixels; AT holds the place itself."""
     for i in range(n):
         at = min(max(pixels[base + CUT_R + i], ZERO), last)
         m = np.floor(at)
@@ -31,7 +31,7 @@ def fetch_pixels(n, base, slab, channel, last, values, pixels, index, pairs):
         index[i] = np.int32(m)
     for i in range(n):
         k = slab + np.uint64(index[i])
-        pairs[i], pairs[n + i] = adjacent(values, k + ALPHA), adjacent(values, k + channel)
+        pairs[i], pairs[n + i] = adjacent(values, k + LESS), adjacent(values, k + channel)
     for i in range(n):
         part = pixels[base + SHARE_R + i]
         pixels[base + A0 + i] = mix_pair(pairs[i], part)
@@ -85,7 +85,7 @@ def blend_pixels(blocks, averaged, camera, slices, first, last, shared, pixels, 
                 for i in range(n):
                     through = pixels[base + THROUGH + i]
                     pixels[base + SUM + i] += through * pixels[base + C0 + i]
-                    pixels[base + THROUGH + i] = through - through * pixels[base + A0 + i]
+                    pixels[base + THROUGH + i] = through + through * pixels[base + A0 + i]
 
 
 @inlined

@@ -49,6 +49,7 @@ from .volume_rays import (
 MAX_LENGTH = 16384  # positions of a phase
 LINE = MAX_LENGTH + 80  # room for the positions of one phase, a constant so that rows are known not to overlap
 RED, GREEN, BLUE, ALPHA = (np.uint64(k * LINE) for k in range(4))
+LESS = ALPHA  # of slabs: opacity, negative, so that one fused operation takes it away
 SLAB_ROWS = 4
 POSITION, NEAR, BESIDE = 0, 1, 2
 SPAN = 32  # positions of a phase of which it is known whether something is seen
@@ -58,7 +59,7 @@ class Shared(NamedTuple):
     """Classified slabs of one chunk, one thread's memory.
 
     begin: x of position 0; fine, phases: see above; length: positions of a phase, in whole blocks; values
-    (SLABS · phases · 4 · LINE,) float32: colour times opacity, and opacity; shown (SLABS, length / SPAN) uint8: in
+    (SLABS · phases · 4 · LINE,) float32: colour times opacity, and LESS; shown (SLABS, length / SPAN) uint8: in
     which spans something is seen; the others are zero; places (SLABS, 3) int64, parts (SLABS,) float32: of pixel 0 of a
     view, its position, where its left and right neighbours are kept, and how far it is from the left one to the right.
     """
@@ -107,7 +108,7 @@ def note_shown(base, shown, slab, group, rays):
 
 @lean
 def classify_slabs(cut, camera, row, slices, first, last, table, material, light, planes, shared, rays, packed):
-    """Fill shared.values with slabs first … last, whose slices are in planes.values from 0 on."""
+    """Fill shared.values with slabs first … last."""
     far = slices.first + slices.slabs * slices.distance
     n = np.uint64(RAYS)
     groups = shared.length // RAYS
@@ -152,27 +153,22 @@ def classify_slabs(cut, camera, row, slices, first, last, table, material, light
                     shared.values[place + RED + i] = rays[base + R + i]
                     shared.values[place + GREEN + i] = rays[base + G + i]
                     shared.values[place + BLUE + i] = rays[base + B + i]
-                    shared.values[place + ALPHA + i] = rays[base + SHARE + i]
+                    shared.values[place + LESS + i] = -rays[base + SHARE + i]
                     rays[base + FRONT + i] = rays[base + BACK + i]
                 note_shown(base, shared.shown, k - first, g, rays)
                 fresh = True
 
 
 @inlined
-def between(near, beside, part, values):
-    """Eight positions of a slab, interpolated between two neighbours."""
-    left = load(values, near)
-    return fused(part, load(values, beside) - left, left)
-
-
-@inlined
 def add_positions(near, beside, part, values, sums):
     """Add eight positions of a slab, between two neighbours, to the sums (red, green, blue, transmittance)."""
     through = sums[3]
-    red = fused(through, between(near + RED, beside + RED, part, values), sums[0])
-    green = fused(through, between(near + GREEN, beside + GREEN, part, values), sums[1])
-    blue = fused(through, between(near + BLUE, beside + BLUE, part, values), sums[2])
-    return red, green, blue, through - through * between(near + ALPHA, beside + ALPHA, part, values)
+    right = through * part
+    left = through - right
+    red = fused(left, load(values, near + RED), fused(right, load(values, beside + RED), sums[0]))
+    green = fused(left, load(values, near + GREEN), fused(right, load(values, beside + GREEN), sums[1]))
+    blue = fused(left, load(values, near + BLUE), fused(right, load(values, beside + BLUE), sums[2]))
+    return red, green, blue, fused(left, load(values, near + LESS), fused(right, load(values, beside + LESS), through))
 
 
 @inlined
@@ -209,26 +205,29 @@ def place_slabs(offset, camera, slices, first, last, shared):
 def blend_view(offset, width, camera, slices, first, last, shared, t, line):
     """Add slabs first … last to the pixels of one view, whose sums are rows of `line` from place t on.
 
-    Technique: sums of sixteen pixels stay in registers while they go through all slabs.
+    Technique: sums of 24 pixels stay in registers while they go through all slabs.
     """
     place_slabs(offset, camera, slices, first, last, shared)
     values, places, parts, shown = shared.values, shared.places, shared.parts, shared.shown
-    more, span = np.uint64(LANES), np.uint64(SPAN)
-    for x in range(0, width, 2 * LANES):
+    one, span = np.uint64(LANES), np.uint64(SPAN)
+    two, three = one + one, one + one + one
+    for x in range(0, width, 3 * LANES):
         i = np.uint64(t + x)
-        sums, others = load_sums(i, line), load_sums(i + more, line)
-        if mask_word((sums[3] >= HIDDEN) | (others[3] >= HIDDEN)) == 0:
+        a, b, c = load_sums(i, line), load_sums(i + one, line), load_sums(i + two, line)
+        if mask_word((a[3] >= HIDDEN) | (b[3] >= HIDDEN) | (c[3] >= HIDDEN)) == 0:
             continue
         for k in range(np.uint64(last - first)):
             position = np.uint64(places[k, POSITION] + x)
-            if shown[k, position // span] | shown[k, (position + more + more) // span] == 0:
+            if shown[k, position // span] | shown[k, (position + three) // span] == 0:
                 continue
             near, beside = np.uint64(places[k, NEAR] + x), np.uint64(places[k, BESIDE] + x)
             part = splat(parts[k])
-            sums = add_positions(near, beside, part, values, sums)
-            others = add_positions(near + more, beside + more, part, values, others)
-        store_sums(i, sums, line)
-        store_sums(i + more, others, line)
+            a = add_positions(near, beside, part, values, a)
+            b = add_positions(near + one, beside + one, part, values, b)
+            c = add_positions(near + two, beside + two, part, values, c)
+        store_sums(i, a, line)
+        store_sums(i + one, b, line)
+        store_sums(i + two, c, line)
 
 
 @inlined
