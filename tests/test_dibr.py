@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import autostereo as aus
 from autostereo.methods.dibr import reference_views
@@ -97,6 +99,125 @@ def test_a_picture_with_depth_alone():
     np.testing.assert_array_equal(aus.warp(outer, RIG, RIG.camera_offsets[[0, 8]]).color, both.color)
 
 
+def test_what_is_infinitely_far_slides_as_far_as_the_focal_plane_is_near():
+    """A sky: fx·Δv/fd pixels to the right from view to view, here two; and a thing on the focal plane before it rests."""
+    rig = replace(RIG, baseline=2 * 4 / FOCAL * 8)
+    sky = np.random.default_rng(2).integers(0, 256, (1, H, W, 4)).astype(np.uint8)
+    depth = np.full((1, H, W), np.inf, np.float32)
+    depth[:, 20:40, 30:50] = 4.0
+    found = aus.warp(aus.ViewStack(sky, depth), rig)
+    assert found.depth is not None
+    for k in range(9):
+        expected = sky[0][:, np.clip(np.arange(W) - 2 * (k - 4), 0, W - 1)]
+        still = np.zeros((H, W), bool)
+        still[20:40, 30:50] = True
+        hidden = np.zeros((H, W), bool)  # the sky behind the thing, which no picture shows
+        hidden[20:40, 30 + min(2 * (k - 4), 0) : 50 + max(2 * (k - 4), 0)] = True
+        np.testing.assert_array_equal(found.color[k][still], sky[0][still])
+        np.testing.assert_array_equal(found.color[k][~hidden], expected[~hidden])
+        np.testing.assert_array_equal(found.depth[k], np.where(still, 4.0, np.inf))
+
+
+# --- a plain twin ----------------------------------------------------------------------------------------------------
+
+
+def segments(row, inverse):
+    """Ends of all segments of a row: (first pixel, its share of a half, second pixel, its share)."""
+    yield 0, -0.5, 0, 0.0
+    for i in range(len(row) - 1):
+        a, b = inverse[i], inverse[i + 1]
+        before, after = inverse[i - 1] if i else 0.0, inverse[i + 2] if i + 2 < len(row) else 0.0
+        slopes = [abs(2 * a - before - b)] * bool(before > 0) + [abs(2 * b - after - a)] * bool(after > 0)
+        error = min([abs(a - b), *slopes])
+        if (a == b == 0) if a * b == 0 else error <= 0.01 * max(a, b):
+            yield i, 0.0, i + 1, 0.0
+        else:
+            yield i, 0.0, i, 0.5
+            yield i + 1, -0.5, i + 1, 0.0
+    yield len(row) - 1, 0.0, len(row) - 1, 0.5
+
+
+def seen(row, inverse, slide, focal):
+    """Colours (W, 4) and inverse depth (W,) that a row shows after a slide: every sample tries every segment."""
+    x = np.arange(len(row)) + 0.5
+    color, near = np.zeros((len(row), 4)), np.full(len(row), -1.0)
+    place = x + slide * (1 / focal - inverse)
+    for i, before, j, after in segments(row, inverse):
+        first, last = place[i] + before, place[j] + after
+        if last <= first:
+            continue
+        t = (x - first) / (last - first)
+        w = inverse[i] + t * (inverse[j] - inverse[i])
+        nearer = (first <= x) & (x < last) & (w > near)
+        near[nearer] = w[nearer]
+        color[nearer] = (row[i] + t[:, None] * (row[j].astype(float) - row[i]))[nearer]
+    return color, near
+
+
+def warped(rows, inverses, offsets, offset, fx, focal):
+    """One row of a view, from rows (R, W, 4) and inverse depths (R, W) of references, as the module's text has it."""
+    order = sorted(range(len(rows)), key=lambda k: abs(offsets[k] - offset))
+    color, near = seen(rows[order[0]], inverses[order[0]], fx * (offset - offsets[order[0]]), focal)
+    for n, k in enumerate(order[1:]):
+        other, inverse = seen(rows[k], inverses[k], fx * (offset - offsets[k]), focal)
+        for j in range(len(near)):
+            gap = abs(offsets[order[0]] - offset) / (abs(offsets[order[0]] - offset) + abs(offsets[k] - offset))
+            both = near[j] >= 0 and inverse[j] >= 0
+            alike = both and abs(near[j] - inverse[j]) <= 0.01 * max(near[j], inverse[j])
+            part = gap if alike and n == 0 else 1.0 if inverse[j] > near[j] and (n == 0 or near[j] < 0) else 0.0
+            if part:
+                color[j], near[j] = color[j] + part * (other[j] - color[j]), near[j] + part * (inverse[j] - near[j])
+    filled = np.flatnonzero(near >= 0)
+    for j in np.flatnonzero(near < 0):
+        left, right = filled[filled < j], filled[filled > j]
+        if len(left) and len(right):
+            source = left[-1] if near[left[-1]] <= near[right[0]] else right[0]
+            color[j], near[j] = color[source], near[source]
+        else:
+            column = -1 if len(left) else 0
+            k = min(order, key=lambda k: inverses[k][column])
+            color[j], near[j] = rows[k][column], inverses[k][column]
+    return np.floor(color + 0.5), near
+
+
+DEPTHS = st.lists(st.sampled_from([0.7, 2.0, 2.01, 2.03, 4.0, 4.2, 30.0, np.inf]), min_size=1, max_size=14)
+
+
+@settings(max_examples=200, deadline=None)
+@given(DEPTHS, st.lists(st.floats(-1, 1).map(lambda x: round(x, 3)), min_size=1, max_size=4), st.integers(0, 2**32 - 1))
+def test_rows_are_those_of_the_plain_twin(row, offsets, seed):
+    """Random steps, slopes and skies, seen from up to four places in any order, beside or beyond them."""
+    rng, width = np.random.default_rng(seed), len(row)
+    depth = np.stack([rng.permutation(row) if k % 2 else row for k in range(len(offsets))]).astype(np.float32)
+    color = rng.integers(0, 256, (len(offsets), 1, width, 4)).astype(np.uint8)
+    rig = replace(RIG, views=7, aspect=width / 20)
+    found = aus.warp(aus.ViewStack(color, depth[:, None]), rig, offsets)
+    fx, inverse = 1 / 2 / np.tan(np.deg2rad(20)) * 20, 1 / depth.astype(float)
+    for k, offset in enumerate(rig.camera_offsets):
+        if offset in offsets:
+            np.testing.assert_array_equal(found.color[k], color[offsets.index(offset)])
+            continue
+        expected, near = warped(color[:, 0], inverse, offsets, offset, fx, 4.0)
+        np.testing.assert_array_equal(found.color[k, 0], expected)
+        with np.errstate(divide="ignore"):
+            np.testing.assert_allclose(found.depth[k, 0], 1 / near, rtol=1e-6)
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_no_hole_stays_open_whatever_the_depths(count):
+    """Every colour and depth lies within what its row has, from the least depth that a float32 holds to the greatest."""
+    rng = np.random.default_rng(count)
+    extremes = np.array([1e-45, 1e-30, 1e-3, 1.0, 3.9, 4.0, 1e3, 3e38, np.inf], np.float32)
+    depth = rng.choice(extremes, (count, H, W))
+    color = rng.integers(60, 200, (count, H, W, 4)).astype(np.uint8)
+    color[:, ::2] //= 2
+    found = aus.warp(aus.ViewStack(color, depth), RIG, np.linspace(-0.4, 0.3, count))
+    assert found.depth is not None
+    for pictures, of in ((color, found.color), (depth, found.depth)):
+        low, high = (f(f(pictures, axis=2), axis=0) for f in (np.min, np.max))  # (H, …)
+        assert (of >= low[:, None]).all() and (of <= high[:, None]).all()
+
+
 # --- against exact views ---------------------------------------------------------------------------------------------
 
 
@@ -163,7 +284,7 @@ def test_what_cannot_be_warped_is_refused():
     picture = views(aus.Scene(wall(5.0)), "single-pass", RIG.with_views(1))
     with pytest.raises(aus.InputError, match="pictures: expected a ViewStack with depth"):
         aus.warp(aus.ViewStack(picture.color), RIG)
-    with pytest.raises(aus.InputError, match=r"offsets: expected 1 numbers, .* got 2"):
+    with pytest.raises(aus.InputError, match=r"offsets: expected 1 numbers, .* got \(0.0, 1.0\)"):
         aus.warp(picture, RIG, (0.0, 1.0))
     for bad in (0.0, -1.0, np.nan):
         depth = picture.depth.copy()
