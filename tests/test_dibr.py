@@ -118,6 +118,17 @@ def test_what_is_infinitely_far_slides_as_far_as_the_focal_plane_is_near():
         np.testing.assert_array_equal(found.depth[k], np.where(still, 4.0, np.inf))
 
 
+def test_what_is_hidden_from_all_is_what_lies_behind_the_edge_and_no_smear():
+    """A gap between two posts, through which the references see sky, but none of it where a view between them does."""
+    depth = np.full((1, 1, 60), np.inf, np.float32)
+    depth[..., 10:30] = depth[..., 34:50] = 4.0  # on the focal plane: they rest, the sky slides
+    color = np.where(np.isfinite(depth), 200, 30)[..., None].repeat(4, axis=-1).astype(np.uint8)
+    rig = replace(RIG, baseline=100 / 4 * 8, views=9, aspect=60.0)  # farther than a post is wide
+    found = aus.warp(aus.ViewStack(color, depth), rig)
+    for view in found.color:
+        np.testing.assert_array_equal(view, color[0])
+
+
 # --- a plain twin ----------------------------------------------------------------------------------------------------
 
 
@@ -137,15 +148,24 @@ def segments(row, inverse):
     yield len(row) - 1, 0.0, len(row) - 1, 0.5
 
 
-def seen(row, inverse, slide, focal):
+def gaps(row, inverse):
+    """The same of what lies between two pixels that are not joined: the farther of them goes on."""
+    for i, before, j, after in segments(row, inverse):
+        if i == j and after == 0.5 and i + 1 < len(row):
+            yield i, 0.5, i + 1, -0.5
+
+
+def seen(row, inverse, slide, focal, of=segments):
     """Colours (W, 4) and inverse depth (W,) that a row shows after a slide: every sample tries every segment."""
     x = np.arange(len(row)) + 0.5
     color, near = np.zeros((len(row), 4)), np.full(len(row), -1.0)
     place = x + slide * (1 / focal - inverse)
-    for i, before, j, after in segments(row, inverse):
+    for i, before, j, after in of(row, inverse):
         first, last = place[i] + before, place[j] + after
         if last <= first:
             continue
+        if of is gaps:
+            i = j = i if inverse[i] < inverse[j] else j
         t = (x - first) / (last - first)
         w = inverse[i] + t * (inverse[j] - inverse[i])
         nearer = (first <= x) & (x < last) & (w > near)
@@ -167,6 +187,9 @@ def warped(rows, inverses, offsets, offset, fx, focal):
             part = gap if alike and n == 0 else 1.0 if inverse[j] > near[j] and (n == 0 or near[j] < 0) else 0.0
             if part:
                 color[j], near[j] = color[j] + part * (other[j] - color[j]), near[j] + part * (inverse[j] - near[j])
+    for k in order:
+        guess, inverse = seen(rows[k], inverses[k], fx * (offset - offsets[k]), focal, gaps)
+        color, near = np.where((near < 0)[:, None], guess, color), np.where(near < 0, inverse, near)
     filled = np.flatnonzero(near >= 0)
     for j in np.flatnonzero(near < 0):
         left, right = filled[filled < j], filled[filled > j]
@@ -229,6 +252,7 @@ def scenes():
         "a mesh": (mesh, 37, 38),
         "before a wall": ([mesh, wall(5.5)], 34, 35),
         "points": (replace(samples.surfel_cloud(4000), transform=place), 33, 35),
+        "a volume": (replace(samples.shells(24), transform=place), 31, 38),
     }
 
 
@@ -256,7 +280,9 @@ def test_panels_are_the_interlaced_views(engine):
         need_device()
     display = aus.Display.slanted(*SIZE, 9, lens_pitch=5.7, subpixel_pitch=1.0, slant_deg=9.46)
     scene = [wall(5.5), aus.Mesh([(-0.5, -0.5, -3), (0.5, -0.5, -3.5), (0, 0.5, -2.5)], [[0, 1, 2]], material=PLAIN)]
-    for shown in (display, replace(display, flip_x=True, flip_y=True)):
+    mirrored = replace(display, flip_x=True, flip_y=True)
+    continuous = replace(display, viewmap=replace(display.viewmap, continuous=True))  # rounded to the nearest view
+    for shown in (display, mirrored, continuous, aus.Display.lenticular(*SIZE, 9, per="subpixel")):
         panel = aus.render(scene, shown, RIG, method="dibr", engine=engine, options=aus.Options(references=3))
         stack = views(scene, engine=engine, references=3)
         np.testing.assert_array_equal(panel.pixels, aus.interlace(stack, shown).pixels)
@@ -286,8 +312,17 @@ def test_what_cannot_be_warped_is_refused():
         aus.warp(aus.ViewStack(picture.color), RIG)
     with pytest.raises(aus.InputError, match=r"offsets: expected 1 numbers, .* got \(0.0, 1.0\)"):
         aus.warp(picture, RIG, (0.0, 1.0))
-    for bad in (0.0, -1.0, np.nan):
-        depth = picture.depth.copy()
+    for bad in ((np.nan,), (1e31,), ((0.0,),), ("left",), None):
+        with pytest.raises(aus.InputError, match="offsets: expected"):
+            aus.warp(picture, RIG, bad)
+    with pytest.raises(aus.InputError, match="rig: expected a Rig, got NoneType"):
+        aus.warp(picture, None)
+    with pytest.raises(aus.InputError, match=r"depth: expected shape \(1, 64, 96\), got \(1, 63, 96\)"):
+        aus.ViewStack(picture.color, picture.depth[:, 1:])
+    with pytest.raises(aus.InputError, match="expected depths and offsets that are numbers"):
+        aus.warp(aus.ViewStack(picture.color, np.full((1, H, W), "near")), RIG)
+    for bad in (0.0, -1.0, np.nan, -np.inf, 1e-50):
+        depth = picture.depth.astype(np.float64)
         depth[0, 3, 5] = bad
         with pytest.raises(aus.InputError, match="pictures: expected depths > 0"):
             aus.warp(aus.ViewStack(picture.color, depth), RIG)

@@ -3,9 +3,9 @@
 Cameras stand on one line, so a pixel stays in its row, and slides by fx·Δv·(1/fd − 1/d) (DESIGN section 1): warping is
 a matter of rows. Neighbours in a row that lie on one surface span a segment, which slides with its ends; where depth
 jumps, each keeps its half of the pixel between. The nearest segment is seen. The two nearest references that see a
-sample at about the same depth are blended by their distances; others, in turn, fill what both do not see; what nobody
-sees is taken from the farther of its two sides, or at the picture's border from the references' own. PMR 2020, section
-4.2, compares with it as MDIBR (Guan et al. 2019).
+sample at about the same depth are blended by their distances; others, in turn, fill what both do not see. What nobody
+sees is guessed: where depth jumps and its two sides part, the farther goes on to where it is seen; beyond the pictures,
+their borders do. PMR 2020, section 4.2, compares with it as MDIBR (Guan et al. 2019).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ HALF = 0.5
 @inlined
 def inverse_of(depth):
     """1/d; 0 of what is infinitely far."""
-    return 1.0 / depth if np.isfinite(depth) else 0.0
+    return 1.0 / np.float64(depth) if np.isfinite(depth) else 0.0
 
 
 @inlined
@@ -100,6 +100,20 @@ def warp_row(pixel, joined, slide, inverse_focal, found, near):
     put(pixel, at, at + HALF, (width - 1, width - 1), found, near)
 
 
+@kernel
+def guess_row(pixel, joined, slide, inverse_focal, found, near):
+    """Fill found, near as `warp_row` with what may be where a row shows nothing: the farther side of each gap."""
+    width = near.shape[0]
+    for j in range(width):
+        near[j] = -1.0
+    for i in range(width - 1):
+        if not joined[i]:
+            at = i + HALF + slide * (inverse_focal - pixel[i, 4])
+            after = i + 1 + HALF + slide * (inverse_focal - pixel[i + 1, 4])
+            far = i if pixel[i, 4] < pixel[i + 1, 4] else i + 1
+            put(pixel, at + HALF, after - HALF, (far, far), found, near)
+
+
 @inlined
 def mix_rows(found, near, other, other_near, share, blend):
     """Complete a row by what another reference shows of it, `share` of the colour where both see the same."""
@@ -132,7 +146,7 @@ def fill_border(pixels, order, ends, found, near):
 
 @inlined
 def fill_holes(pixels, order, found, near):
-    """Take what nobody sees within a row from the farther of its two sides."""
+    """Take what lies beyond the pictures from their borders, and between two that do not meet from the farther side."""
     width = near.shape[0]
     start = 0
     while start < width:
@@ -182,6 +196,12 @@ def warp_rows(span, colors, depths, order, slides, inverse_focal, out, out_depth
                 warp_row(pixels[other_one], joined[other_one], slides[v, k], inverse_focal, other, other_near)
                 share = abs(slides[v, 0]) / (abs(slides[v, 0]) + abs(slides[v, k]))
                 mix_rows(found, near, other, other_near, share, k == 1)
+            for k in range(count):
+                if near.min() >= 0.0:
+                    break
+                other_one = order[v, k]
+                guess_row(pixels[other_one], joined[other_one], slides[v, k], inverse_focal, other, other_near)
+                mix_rows(found, near, other, other_near, 1.0, False)
             fill_holes(pixels, order[v], found, near)
             for j in range(width):
                 for c in range(4):
