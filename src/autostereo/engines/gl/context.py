@@ -112,7 +112,7 @@ class Device:
 
     @contextmanager
     def without_reading(self) -> Iterator[None]:
-        """Leave finished pictures on the device meanwhile, as for a screen: arrays to draw into stay as they are.
+        """Leave finished pictures without depths on the device meanwhile, as for a screen: their arrays stay as they are.
 
         Frames in a row then overlap, and what is timed is drawing; `finish` waits for it.
         """
