@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import autostereo as aus
@@ -203,15 +203,20 @@ def warped(rows, inverses, offsets, offset, fx, focal):
     return np.floor(color + 0.5), near
 
 
-DEPTHS = st.lists(st.sampled_from([0.7, 2.0, 2.01, 2.03, 4.0, 4.2, 30.0, np.inf]), min_size=1, max_size=14)
+SLOPE = [1 / w for w in (0.5, 0.46, 0.42, 0.38, 0.34)]  # inverse depths on one line, apart by more than one per cent
+FLAT = [0.7, 2.0, 2.01, 2.03, 4.0, 4.2, 30.0, np.inf]
+RUNS = st.one_of(st.sampled_from([SLOPE[:2], SLOPE, SLOPE[::-1]]), st.lists(st.sampled_from(FLAT), max_size=5))
+DEPTHS = st.lists(RUNS, min_size=1, max_size=3).map(lambda runs: sum(runs, []) or [4.0])
 
 
 @settings(max_examples=200, deadline=None)
+@example([0.7] * 7 + [0.705] * 7, [-0.28, 0.28], 0)  # seen from the middle, the two pictures do not meet
+@example([0.7] * 7 + [0.705] * 7, [-0.28, 0.28], 9)
 @given(DEPTHS, st.lists(st.floats(-1, 1).map(lambda x: round(x, 3)), min_size=1, max_size=4), st.integers(0, 2**32 - 1))
 def test_rows_are_those_of_the_plain_twin(row, offsets, seed):
     """Random steps, slopes and skies, seen from up to four places in any order, beside or beyond them."""
     rng, width = np.random.default_rng(seed), len(row)
-    depth = np.stack([rng.permutation(row) if k % 2 else row for k in range(len(offsets))]).astype(np.float32)
+    depth = np.stack([np.roll(row, rng.integers(width)) for _ in offsets]).astype(np.float32)
     color = rng.integers(0, 256, (len(offsets), 1, width, 4)).astype(np.uint8)
     rig = replace(RIG, views=7, aspect=width / 20)
     found = aus.warp(aus.ViewStack(color, depth[:, None]), rig, offsets)
