@@ -10,10 +10,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from autostereo.cli.benchmarks import (
-    harness, papers, papers_plane, papers_published, papers_studio, report, suite, workloads
-)  # fmt: skip
-from autostereo.cli.benchmarks.papers_studio import PapersStudio, Way
+from autostereo.cli.benchmarks import harness, papers, papers_plane, papers_published, report, suite, workloads
+from autostereo.cli.benchmarks.papers_studio import PapersStudio, Way, on_cpu
 from autostereo.cli.benchmarks.suite import BenchOptions, Work
 from autostereo.display.display import Display
 from autostereo.engines.options import Options
@@ -295,5 +293,5 @@ def test_references_are_read_back_nevertheless():
 
 
 def test_cpu_columns_are_drawn_by_the_cpu():
-    way = papers_studio.on_cpu(Way("x", SIZE, workloads.rig_for(Scene((icosphere(1),)), 2, SIZE), "geometry-shader"))
+    way = on_cpu(Way("x", SIZE, workloads.rig_for(Scene((icosphere(1),)), 2, SIZE), "geometry-shader"))
     assert (way.name, way.engine, way.method) == ("cpu engine", "cpu", "single-pass")

@@ -1,4 +1,4 @@
-"""Depths of a picture: NumPy arrays, and grey pictures of 16 bits or of floats, as depth cameras and renderers write."""
+"""Depths of a picture: NumPy arrays, and grey pictures of 16 bits or of floats, as depth cameras write."""
 
 from __future__ import annotations
 

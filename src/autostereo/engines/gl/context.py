@@ -112,8 +112,9 @@ class Device:
 
     @contextmanager
     def without_reading(self) -> Iterator[None]:
-        """Leave finished pictures without depths on the device meanwhile, as for a screen: their arrays stay as they are.
+        """Leave finished pictures on the device meanwhile, as for a screen: arrays to draw into stay as they are.
 
+        Views with depths are read nevertheless: method dibr works on them.
         Frames in a row then overlap, and what is timed is drawing; `finish` waits for it.
         """
         before, self.reads = self.reads, False

@@ -112,7 +112,7 @@ def draw_views(job: Job, stages: list[Stage], target: Target) -> None:
     """Draw a stack of views, as many at a time as an atlas may hold."""
     for part in atlases(job):
         _draw_samples(part, stages, target.depth)
-        wanted = job.device.reads or target.depth is not None  # depths are read in any case: those pictures are worked on
+        wanted = job.device.reads or target.depth is not None  # what has depths is worked on: dibr
         for tile in range(part.count if wanted else 0):
             part.atlas.read_color(tile, target.color[part.first + tile])
 
