@@ -126,8 +126,8 @@ def frame_rig(scene: Any, display: Display, side: str = "front") -> Rig:
 def frame_depths(depth: NDArray[np.float32], display: Display, fov_y: float) -> Rig:
     """Choose a rig for a picture with depths (H, W), taken with `fov_y` degrees from (0, 0, 0) along −z.
 
-    Focal plane and baseline as in `frame_rig`, for depths from the first to the ninety-ninth per cent: depth cameras have
-    outliers.
+    Focal plane and baseline as in `frame_rig`, for depths from the first to the ninety-ninth per cent: depth cameras
+    have outliers.
 
     Raises
     ------
