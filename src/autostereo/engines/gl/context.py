@@ -80,6 +80,13 @@ class Device:
 
         return Programs(self)
 
+    @cached_property
+    def filters_coarsely(self) -> bool:
+        """Whether textures are interpolated with weights of a few bits, as GPUs do; the device has to be entered."""
+        from .filtering import interpolates_coarsely
+
+        return interpolates_coarsely(self)
+
     def __enter__(self) -> Device:
         self._lock.acquire()
         if self._entered == 0:
