@@ -13,6 +13,7 @@ from functools import cache
 import pytest
 
 import autostereo as aus
+from autostereo.engines.gl import volume
 from autostereo.engines.gl.programs import SHADERS, source
 from autostereo.scene.samples import surfel_cloud
 from gl_device import need_device
@@ -23,11 +24,14 @@ KINDS = {
     "images": re.compile(r"\buniform\s+[ui]?image\w+\s+\w+"),
     "samplers": re.compile(r"\buniform\s+(?:\w+\s+)*?[ui]?sampler\w+\s+\w+"),
     "storage": re.compile(r"^layout\(std430[^)]*\)[^;{]*\bbuffer\s+\w+"),
+    "colours": re.compile(r"^(?:layout\([^)]*\)\s*)?out\s+u?vec4\s+\w+;"),
 }
 OWN = {
     name for stage in STAGES for name in re.findall(r"^#define (\w+)$", (SHADERS / stage).read_text("utf-8"), re.M)
 }
-MOST = {"images": 8, "samplers": 16, "storage": 8}
+MOST = {"images": 8, "samplers": 16, "storage": 8, "colours": 8}
+TOGETHER = 8  # images, storage buffers and colours (GL_MAX_COMBINED_SHADER_OUTPUT_RESOURCES)
+UNITS = 8  # bindings of images and of storage buffers
 
 
 class Zeros(dict):
@@ -40,11 +44,35 @@ class Zeros(dict):
 @cache
 def lines_of(stage: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """A stage's lines that matter, and the switches that it looks at and no stage sets by itself."""
-    lines = [line.split("//")[0].strip() for line in source(stage).splitlines()]
-    asked = {name for line in lines for name in re.findall(r"#\s*ifn?def\s+(\w+)|defined\((\w+)\)", line)}
-    names = {a or b for a, b in asked} - OWN
-    wanted = [line for line in lines if line.startswith("#") or any(kind.search(line) for kind in KINDS.values())]
-    return tuple(wanted), tuple(sorted(names))
+    wanted: list[str] = []
+    for line in (text.split("//")[0].strip() for text in source(stage).splitlines()):
+        if not line.startswith("#"):
+            wanted += [line] if any(kind.search(line) for kind in KINDS.values()) else []
+        elif not line.startswith("#endif"):
+            wanted.append(line)
+        else:  # what nothing depends on goes
+            while wanted[-1].startswith("#el"):
+                wanted.pop()
+            if wanted[-1].startswith("#if"):
+                wanted.pop()
+            else:
+                wanted.append(line)
+    asked = {name for line in wanted for name in re.findall(r"#\s*ifn?def\s+(\w+)|defined\((\w+)\)", line)}
+    names = {a or b for a, b in asked}
+    return tuple(wanted), tuple(sorted(name for name in names if name not in OWN or is_given(stage, name)))
+
+
+def is_given(stage: str, name: str) -> bool:
+    """Whether a stage's own file looks at a switch that it does not set."""
+    text = (SHADERS / stage).read_text("utf-8")
+    return re.search(rf"#\s*ifn?def {name}$", text, re.M) is not None and f"#define {name}\n" not in text
+
+
+def size(line: str) -> int:
+    """How many a line declares: one, or one for each volume that is drawn at a time."""
+    found = re.search(r"\[(\w+)\];", line)
+    assert found is None or found[1] == "VOLUMES", line
+    return 1 if found is None or "buffer" in line else volume.TOGETHER
 
 
 def kept(lines: tuple[str, ...], switches: set[str]) -> list[str]:
@@ -73,14 +101,20 @@ def kept(lines: tuple[str, ...], switches: set[str]) -> list[str]:
 @pytest.mark.parametrize("stage", STAGES)
 def test_a_stage_takes_no_more_than_every_device_has(stage: str) -> None:
     lines, names = lines_of(stage)
-    assert len(names) <= 14
+    assert len(names) <= 12
     for count in range(len(names) + 1):
         for switches in itertools.combinations(names, count):
             left = kept(lines, set(switches))
-            for kind, pattern in KINDS.items():
-                found = [line for line in left if pattern.search(line)]
+            found = {kind: [line for line in left if pattern.search(line)] for kind, pattern in KINDS.items()}
+            counts = {kind: sum(map(size, lines)) for kind, lines in found.items()}
+            for kind, lines in found.items():
                 most = 0 if kind == "images" and stage.endswith((".vert", ".geom")) else MOST[kind]
-                assert len(found) <= most, (kind, switches, found)
+                assert counts[kind] <= most, (kind, switches, lines)
+            assert counts["images"] + counts["storage"] + counts["colours"] <= TOGETHER, (switches, found)
+            for kind in ("images", "storage"):
+                units = [int(n) for line in found[kind] for n in re.findall(r"binding = (\d+)", line)]
+                assert len(units) == len(set(units)) == len(found[kind]), (switches, found[kind])
+                assert max(units, default=0) < UNITS
 
 
 def test_the_count_counts() -> None:
@@ -90,6 +124,8 @@ def test_the_count_counts() -> None:
     behind = ("#ifdef A", nine[0], "#else", nine[1], nine[2], "#endif")
     assert len(kept(behind, {"A"})) == 1 and len(kept(behind, set())) == 2
     assert any(KINDS["images"].search(line) for line in lines_of("plane_fine.comp")[0])
+    left = kept(lines_of("volume.frag")[0], {"PANEL", "VIEWMAP_TABLE", "OPAQUE", "COVERED", "SHADED"})
+    assert sum(size(line) for line in left if KINDS["samplers"].search(line)) == 3 * volume.TOGETHER + 3
 
 
 def test_a_device_without_buffers_in_vertex_shaders_is_told_so(monkeypatch: pytest.MonkeyPatch) -> None:
