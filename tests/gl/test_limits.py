@@ -1,6 +1,7 @@
 """What shaders take of a device is within what every device has, whatever is switched on (OpenGL 4.6, section 23).
 
-Storage buffers of vertex shaders are the exception: programs.py asks the device.
+What may be more is asked of the device: storage buffers of vertex shaders, how large these are, lights, numbers that
+vertices hand on.
 """
 
 from __future__ import annotations
@@ -8,12 +9,14 @@ from __future__ import annotations
 import itertools
 import re
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
+import numpy as np
 import pytest
 
 import autostereo as aus
-from autostereo.engines.gl import volume
+from autostereo.engines.gl import plane_rasterizer, volume
+from autostereo.engines.gl.context import Limits
 from autostereo.engines.gl.programs import SHADERS, source
 from autostereo.scene.samples import surfel_cloud
 from gl_device import need_device
@@ -128,9 +131,71 @@ def test_the_count_counts() -> None:
     assert sum(size(line) for line in left if KINDS["samplers"].search(line)) == 3 * volume.TOGETHER + 3
 
 
-def test_a_device_without_buffers_in_vertex_shaders_is_told_so(monkeypatch: pytest.MonkeyPatch) -> None:
+RIG = aus.Rig(position=(0, 0, 4), views=2)
+SQUARE = aus.Mesh([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+PANEL = aus.Display.lenticular(12, 8, 2)
+
+
+def poorer(monkeypatch: pytest.MonkeyPatch, **limits: int) -> None:
+    """A device that has less, and has compiled nothing."""
     device = need_device()
-    monkeypatch.setattr(device, "limits", replace(device.limits, vertex_buffers=0))
+    monkeypatch.setattr(device, "limits", replace(device.limits, **limits))
     monkeypatch.setattr(device.programs, "_made", {})
+
+
+def test_a_device_without_buffers_in_vertex_shaders_is_told_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    poorer(monkeypatch, vertex_buffers=0)
     with pytest.raises(aus.UnsupportedError, match=r"points.vert needs \d storage buffers, .* have 0"):
-        aus.render_views(surfel_cloud(500), aus.Rig(position=(0, 0, 4)), (8, 8), engine="gl")
+        aus.render_views(surfel_cloud(500), RIG, (8, 8), engine="gl")
+
+
+@pytest.mark.parametrize("method", ["covering-quad", "plane-rasterizer"])
+def test_an_object_that_shaders_cannot_read_is_refused(monkeypatch: pytest.MonkeyPatch, method: str) -> None:
+    poorer(monkeypatch, storage=4 * 36)
+    aus.render(SQUARE, PANEL, RIG, method=method, engine="gl")
+    poorer(monkeypatch, storage=4 * 36 - 1)
+    with pytest.raises(aus.UnsupportedError, match=r"takes 0 MB, shaders of this device read 0 MB .*another method"):
+        aus.render(SQUARE, PANEL, RIG, method=method, engine="gl")
+    aus.render(SQUARE, PANEL, RIG, method="instanced", engine="gl")
+
+
+def test_points_that_shaders_cannot_read_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    poorer(monkeypatch, storage=499 * 7 * 16)
+    with pytest.raises(aus.UnsupportedError, match="500 points are more than a buffer of this device holds, 499"):
+        aus.render_views(surfel_cloud(500), RIG, (8, 8), engine="gl")
+
+
+def test_more_lights_than_a_shader_can_be_told_of_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    most = 78  # of the 1024 numbers that OpenGL promises
+    poorer(monkeypatch, uniforms=1024)
+    lights = [aus.DirectionalLight((0, 0, -1), (0.01, 0.01, 0.01))] * (most + 1)
+    aus.render_views(aus.Scene(SQUARE, lights[:most]), RIG, (8, 8), engine="gl")
+    with pytest.raises(aus.UnsupportedError, match=r"79 lights are more than .*, 78 "):
+        aus.render_views(aus.Scene(SQUARE, lights), RIG, (8, 8), engine="gl")
+
+
+def test_what_quads_hand_on_is_asked_of_the_device(monkeypatch: pytest.MonkeyPatch) -> None:
+    poorer(monkeypatch, vertex_outputs=60)
+    image = np.zeros((2, 2, 3), np.uint8)
+    uv = [[0, 0], [1, 0], [1, 1], [0, 1]]
+    shiny = replace(SQUARE, material=aus.Material(specular=0.5), uv=uv, texture=image)
+    draw = partial(aus.render, shiny, PANEL, RIG, method="covering-quad", engine="gl")
+    draw()
+    with pytest.raises(aus.UnsupportedError, match=r"hand on 69 numbers, 60 at most .*lighting='sample'"):
+        draw(options=aus.Options(lighting="vertex"))
+
+
+def test_pictures_that_entries_have_no_bits_for_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    need_device()
+    monkeypatch.setattr(plane_rasterizer, "MAX_SIDE", 16)
+    aus.render_views(SQUARE, RIG, (16, 8), engine="gl", method="plane-rasterizer")
+    with pytest.raises(aus.UnsupportedError, match="at most 16 pixels a side, this one 8×17"):
+        aus.render_views(SQUARE, RIG, (8, 17), engine="gl", method="plane-rasterizer")
+
+
+def test_what_a_device_does_not_tell_is_what_opengl_promises() -> None:
+    info = {"GL_MAX_TEXTURE_SIZE": 16384, "GL_MAX_VIEWPORT_DIMS": (16384, 8192), "GL_MAX_3D_TEXTURE_SIZE": 2048,
+            "GL_MAX_VARYING_VECTORS": 15, "GL_MAX_DRAW_BUFFERS": 8, "GL_MAX_GEOMETRY_OUTPUT_VERTICES": 256}  # fmt: skip
+    limits = Limits.of(info, software=False)
+    assert (limits.texture, limits.storage, limits.uniforms) == (8192, 2**24, 1024)
+    assert (limits.vertex_outputs, limits.vertex_buffers) == (60, 0)
