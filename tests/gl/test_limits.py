@@ -149,6 +149,21 @@ def test_a_device_without_buffers_in_vertex_shaders_is_told_so(monkeypatch: pyte
         aus.render_views(surfel_cloud(500), RIG, (8, 8), engine="gl")
 
 
+def test_an_error_amid_a_drawing_leaves_nothing_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither blending by the least, as points have it, nor clip distances, which meshes have."""
+    draw = partial(aus.render, SQUARE, PANEL, RIG, engine="gl")
+    expected = draw(method="covering-quad").pixels.copy()
+    assert expected.any()
+    with pytest.raises(aus.UnsupportedError, match="geometry shaders of this device"):
+        poorer(monkeypatch, geometry_vertices=3)
+        draw(method="geometry-shader", options=aus.Options(views_per_pass=2))
+    with pytest.raises(aus.UnsupportedError, match="storage buffers"):
+        poorer(monkeypatch, vertex_buffers=0)
+        aus.render_views(surfel_cloud(500), RIG, (8, 8), engine="gl")
+    poorer(monkeypatch, vertex_buffers=8)
+    np.testing.assert_array_equal(draw(method="covering-quad").pixels, expected)
+
+
 @pytest.mark.parametrize("method", ["covering-quad", "plane-rasterizer"])
 def test_an_object_that_shaders_cannot_read_is_refused(monkeypatch: pytest.MonkeyPatch, method: str) -> None:
     poorer(monkeypatch, storage=4 * 36)

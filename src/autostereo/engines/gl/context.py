@@ -27,6 +27,8 @@ VERSIONS = (460, 450, 440, 430, 420, 410, 400, 330)  # asked for in turn; 330 so
 GL_VERSION = 400  # double precision in shaders, which view maps need (lib/viewmap.glsl)
 DEBIAN_PACKAGES = "libegl1 libgl1-mesa-dri libgl1"
 SOFTWARE = ("llvmpipe", "softpipe", "swiftshader", "software rasterizer")
+ADD = 0x8006  # GL_FUNC_ADD
+CLIP_DISTANCES = range(0x3000, 0x3004)  # GL_CLIP_DISTANCE0 … 3, which cut tiles
 LIGHT_NUMBERS, OTHER_UNIFORMS = 8, 400  # numbers of a light; of what else shaders are told, at most
 GPU_NODES = ("/dev/dri", "/dev/nvidiactl", "/dev/dxg", "/dev/mali0", "/dev/kgsl-3d0")  # one is there if a GPU is
 
@@ -146,9 +148,17 @@ class Device:
         self._entered -= 1
         try:
             if self._entered == 0:
+                if error is not None:
+                    self._restore()
                 self.ctx.__exit__(kind, error, trace)
         finally:
             self._lock.release()
+
+    def _restore(self) -> None:
+        """What drawing relies on, if an error came amid a drawing that had set it otherwise."""
+        self.ctx.blend_equation, self.ctx.depth_func = ADD, "<"
+        for distance in CLIP_DISTANCES:
+            self.ctx.disable_direct(distance)
 
     @contextmanager
     def without_reading(self) -> Iterator[None]:
