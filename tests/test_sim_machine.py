@@ -156,7 +156,7 @@ def test_simulate_depth_of_field(cli: Run, folder: Path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("levle",), "expected level, soft-shadows, ocean, atrium or a file, got 'levle'"),
+        (("levle",), "expected level, soft-shadows, ocean, atrium, relief or a file, got 'levle'"),
         (("none.obj",), "none.obj"),
         (("level", "-m", "gpu"), "machine: expected one of"),
         (("level", "--views", "0"), "--views: expected numbers from 1 to 256"),

@@ -25,7 +25,7 @@ MAX_VIEWS = 256
 def simulate(
     scene: Annotated[
         list[str],
-        typer.Argument(metavar="SCENE...", help="level, soft-shadows, ocean or atrium; or files of textured meshes."),
+        typer.Argument(metavar="SCENE...", help="level, soft-shadows, ocean, atrium, relief; or files of meshes."),
     ],
     machine: Annotated[
         list[str] | None,

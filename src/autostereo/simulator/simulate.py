@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..display.rig import Rig
-from ..errors import InputError
+from ..errors import InputError, UnsupportedError
 from ..scene.scene import Scene
 from .kernels import buffers
 from .kernels import state as layout
@@ -85,6 +85,8 @@ def simulate_accumulation(
     """
     if not rigs:
         raise InputError("rigs: expected at least one")
+    if machine.shading.approximate and machine.shading.source == "color-buffer":
+        raise UnsupportedError("machine shading.source: a colour buffer that accumulates holds no colours to reuse")
     samples = sum(rig.views for rig in rigs)
     workload = _checked(scene, rigs[0], machine, size)
     pictures = Pictures.common(size, workload.background)
