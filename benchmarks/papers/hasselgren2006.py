@@ -71,7 +71,8 @@ def small(frames: range) -> Rows:
     for size in ((80, 60), (640, 480)):
         found = study("level", [TX, TRI, OURS], (4,), frames, size=size)
         shares = " / ".join(f"{row['texture'] / found[0]['texture']:.1%}" for row in found)
-        print(f"{size[0]}×{size[1]}, {found[0]['pixels_per_triangle']:.2f} pixels a triangle: BF TX / triangle by triangle / sorted = {shares}")
+        width = f"{size[0]}×{size[1]}, {found[0]['pixels_per_triangle']:.2f} pixels a triangle"
+        print(f"{width}: BF TX / triangle by triangle / sorted = {shares}")
         rows += found
     return rows
 
