@@ -120,7 +120,7 @@ def set_up(corners, facing, view, plan, scratch):
     return first, last
 
 
-@kernel
+@inlined
 def _columns(n, view, plan, scratch, y0):
     """Tiles left … right of each view that may meet the triangle in the row of tiles from y0. Returns their number."""
     tw, th = plan.tile_w, plan.tile_h
@@ -194,7 +194,7 @@ def _measure(view, plan, scratch, v, y0, du, dv):
     return e
 
 
-@kernel
+@inlined
 def _visit(v, tile, y0, triangle, view, plan, depth, color, fragments, scratch):
     """One tile of one view: coverage, depth test, and what becomes of the fragments that pass."""
     edges, side, det = scratch.edges[v], scratch.side[v], scratch.det[v]
@@ -314,7 +314,7 @@ def rasterize(corners, facing, view, plan, depth, color, fragments, scratch):
     return True
 
 
-@kernel
+@inlined
 def _row(triangle, y0, view, plan, depth, color, fragments, scratch):
     """All tiles of a row of tiles, in all views (TRAVERSESCANLINE of section 4.1)."""
     fragments.totals[ROWS] += 1

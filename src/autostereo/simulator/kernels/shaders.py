@@ -90,7 +90,7 @@ def surface(at, dx, dy, eye, uniforms, memory, units, out):
     out[3] = 1.0
 
 
-@kernel
+@inlined
 def level(at, dx, dy, eye, uniforms, memory, units, out):
     """Decal times light map, as games of 2000: two texture units. Attributes uv of both."""
     light = memory.colors[0]
@@ -224,7 +224,7 @@ def ocean(at, dx, dy, eye, uniforms, memory, units, out):
     out[3] = 1.0
 
 
-@kernel
+@inlined
 def built_in(kind, at, dx, dy, eye, uniforms, memory, units, out):
     """The shader of that number. Those that are built in share one kernel, so that it can be kept compiled."""
     if kind == LEVEL:
