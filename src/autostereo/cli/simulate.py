@@ -65,11 +65,13 @@ def simulate(
       autostereo simulate atrium --depth-of-field 16x16
     """
     from ..simulator import Machine, study
+    from ..simulator.simulate import check_size
 
     names = machine or (LENS_DEFAULTS if lens else DEFAULTS)
     machines = [Machine.load(name) for name in names]
     counts = _counts(views)
     pixels = common.parse_size(size) if size else study.SIZE
+    check_size(max(counts), pixels)
     for one in machines:
         one.check_size(pixels)
     if every is None:
