@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +34,11 @@ def test_help_of_a_verb_has_examples(cli: Run, verb: str) -> None:
 
 def test_version(cli: Run) -> None:
     assert cli("--version").out == f"autostereo {aus.__version__}\n"
+
+
+def test_python_m_is_the_command() -> None:
+    done = subprocess.run([sys.executable, "-m", "autostereo", "--version"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"autostereo {aus.__version__}\n", "")
 
 
 # --- the verbs -----------------------------------------------------------------------------------------------------

@@ -243,3 +243,12 @@ def test_the_simulator_stays_in_bounds(change):
     found = simulate(layers(), RIG, MULTI.with_(**change), size=SIZE, maps=True)
     np.testing.assert_array_equal(found.depth, exact.depth)
     assert found.counters["texels"] > 0
+
+
+def test_simulated_shaders_that_give_depths_stay_in_bounds():
+    from autostereo.simulator import simulate
+    from autostereo.simulator.scenes import SCENES
+    from sim_scenes import MULTI
+
+    found = simulate(*SCENES["relief"].at(0, 2), MULTI.with_(shading={"approximate": True}), size=(24, 16))
+    assert found.approximated.sum() > 0

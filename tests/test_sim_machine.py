@@ -132,6 +132,13 @@ def test_simulate_a_scene(cli: Run, folder: Path):
     ]
     assert all(row["total"] == pytest.approx(row["texture"] + row["depth"] + row["color"]) for row in rows)
     assert all(row["frames"] == 2 for row in rows)
+    for row in rows:  # per view, and all counters
+        approximates = row["machine"] == "multi-view-approximate" and row["views"] == 2
+        assert [share > 0 for share in row["share_of_view"]] == [False, approximates][: row["views"]]
+        assert [psnr is not None for psnr in row["psnr_of_view"]] == [False, approximates][: row["views"]]
+        counters = row["counters"]
+        assert counters["depth_read"] + counters["depth_written"] == pytest.approx(row["depth"])
+        assert counters["texture_misses"] * 64 == pytest.approx(row["texture"])
     assert (folder / "out.png").stat().st_size > 1000
 
 
@@ -151,16 +158,23 @@ def test_simulate_depth_of_field(cli: Run, folder: Path):
     assert [(row["machine"], row["views"]) for row in rows] == [
         (machine, views) for views in (1, 2) for machine in ("bf-dc", "multi-view")
     ]
+    assert all(row["frames"] == 2 for row in rows)
+    assert [row["optimum"] for row in rows[::2]] == [None, None]
+    one, two = rows[1], rows[3]
+    assert one["optimum"] == pytest.approx(one["total"])
+    assert two["optimum"] == pytest.approx(one["depth"] + (one["texture"] + one["color"]) / 2)
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("levle",), "expected level, soft-shadows, ocean, atrium or a file, got 'levle'"),
+        (("levle",), "expected level, soft-shadows, ocean, atrium, relief or a file, got 'levle'"),
         (("none.obj",), "none.obj"),
         (("level", "-m", "gpu"), "machine: expected one of"),
         (("level", "--views", "0"), "--views: expected numbers from 1 to 256"),
         (("level", "--size", "4x4"), "8×8 is larger than the frame of 4×4"),
+        (("level", "--size", "8192x8192", "--views", "8"), "268435456 pixels in all views, got 8 of 8192×8192"),
+        (("level", "--aperture", "inf"), "--aperture: expected a number > 0"),
         (("level", "--every", "0"), "--every: expected a number from 1 to 200"),
         (("level", "--camera", "rig.json"), "level has its own camera path"),
         (("level", "--json", "out.txt"), "expected a name ending in .json"),

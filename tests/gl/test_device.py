@@ -18,6 +18,7 @@ import autostereo as aus
 from autostereo.engines import constants
 from autostereo.engines.gl import context, programs
 from autostereo.engines.gl.atlas import MAX_PIXELS, Layout
+from autostereo.engines.gl.job import read_by
 from gl_device import need_device
 
 SCENE = aus.Scene(aus.Mesh([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], [[0, 1, 2]]))
@@ -209,6 +210,28 @@ def test_includes_are_flat_and_all_there():
             names = programs.INCLUDE.findall(path.read_text(encoding="utf-8"))
             assert not (names and path.parent.name == "lib"), path
             assert all((programs.SHADERS / name).is_file() for name in names), path
+
+
+def test_attributes_that_a_driver_drops_are_left_out_of_vertex_arrays():
+    """GPUs drop normals where there is no light; moderngl's skip_errors then bound them to gl_InstanceID, nowhere."""
+    texts = {
+        "mine.vert": "#version 400\nin vec3 position, normal, color;\nout vec3 tint;\n"
+        "void main() { tint = color; gl_Position = vec4(position.xy, 0.1 * float(gl_InstanceID), 1.0); }",
+        "mine.frag": "#version 400\nin vec3 tint;\nout vec4 shown;\nvoid main() { shown = vec4(tint, 1.0); }",
+    }
+    corners = np.array([[-1, -1, 0], [3, -1, 0], [-1, 3, 0]])
+    data = np.hstack([corners, np.full((3, 3), 9), np.tile([1, 0, 1], (3, 1))]).astype(np.float32)
+    device = need_device()
+    with device:
+        ctx, program = device.ctx, device.programs.compile(texts)
+        content = read_by(program, ctx.buffer(data.tobytes()), "3f4 3f4 3f4", "position", "normal", "color")
+        assert content[1:] == ("3f4 3x4 3f4", "position", "color")
+        target = ctx.framebuffer([ctx.texture((2, 2), 4)])
+        target.use()
+        ctx.enable_only(ctx.NOTHING)
+        ctx.vertex_array(program, [content]).render(vertices=3)
+        assert ctx.error == "GL_NO_ERROR"
+        assert target.read(components=3) == b"\xff\x00\xff" * 4
 
 
 def test_programs_are_compiled_once():

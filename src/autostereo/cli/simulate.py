@@ -25,7 +25,7 @@ MAX_VIEWS = 256
 def simulate(
     scene: Annotated[
         list[str],
-        typer.Argument(metavar="SCENE...", help="level, soft-shadows, ocean or atrium; or files of textured meshes."),
+        typer.Argument(metavar="SCENE...", help="level, soft-shadows, ocean, atrium, relief; or files of meshes."),
     ],
     machine: Annotated[
         list[str] | None,
@@ -33,7 +33,10 @@ def simulate(
     ] = None,
     views: Annotated[str, typer.Option("--views", "-n", metavar="V,…", help="Numbers of views.")] = "1,2,4,8,16",
     size: common.Size = None,
-    every: Annotated[int, typer.Option("--every", metavar="N", help="Every N-th of the path's 200 frames.")] = 20,
+    every: Annotated[
+        int | None,
+        typer.Option("--every", metavar="N", help="Every N-th of 200 frames: 20; with --depth-of-field the first."),
+    ] = None,
     camera: common.Camera = None,
     side: common.Side = "front",
     lens: Annotated[
@@ -62,16 +65,20 @@ def simulate(
       autostereo simulate atrium --depth-of-field 16x16
     """
     from ..simulator import Machine, study
+    from ..simulator.simulate import check_size
 
     names = machine or (LENS_DEFAULTS if lens else DEFAULTS)
     machines = [Machine.load(name) for name in names]
     counts = _counts(views)
     pixels = common.parse_size(size) if size else study.SIZE
+    check_size(max(counts), pixels)
     for one in machines:
         one.check_size(pixels)
+    if every is None:
+        every = PATH if lens else 20  # 16×16 samples of one frame are as much work as 16 frames of 16 views
     if not 1 <= every <= PATH:
         raise InputError(f"--every: expected a number from 1 to {PATH}, got {every}")
-    if not aperture > 0:
+    if not 0 < aperture < float("inf"):
         raise InputError(f"--aperture: expected a number > 0, got {aperture:g}")
     samples = common.parse_pair(lens, "--depth-of-field", 64) if lens else (1, 1)
     if picture is not None and lens is not None:
@@ -91,11 +98,10 @@ def simulate(
         common.note("compiling kernels (once, about a minute)…")
     work: study.Study | study.FieldStudy
     if lens is not None:
-        work = study.FieldStudy(source, machines, samples, aperture, counts, frames[:1], pixels)
-        steps = len(counts) * len(machines)
+        work = study.FieldStudy(source, machines, samples, aperture, counts, frames, pixels)
     else:
         work = study.Study(name, source, machines, counts, frames, pixels)
-        steps = len(counts) * len(machines) * len(frames)
+    steps = len(counts) * len(machines) * len(frames)
     with common.working(f"simulating {name}", steps) as step:
         rows = work.run(step)
     if json is not None:

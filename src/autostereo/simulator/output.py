@@ -44,6 +44,11 @@ def show(rows: Rows) -> None:
             f"{row['texels_per_second'] / 1e6:.0f}",
         )  # fmt: skip
     console.print(table)
+    if any(row.get("optimum") for row in rows):
+        console.print("total, of the theoretical optimum: " + ", ".join(
+            f"{row['machine']} {row['views']} at once {row['total'] / row['optimum']:.2f}"
+            for row in rows if row.get("optimum")
+        ))  # fmt: skip
     if "model" in rows[0]:
         console.print(_model_table(rows))
 
@@ -83,7 +88,10 @@ def need_matplotlib() -> None:
 
 
 def save_chart(path: str | os.PathLike[str], rows: Rows) -> None:
-    """Draw bytes against views as the paper's Figure 8: a group of bars a number of views, a bar a machine."""
+    """Draw bytes against views as the paper's Figure 8: a group of bars a number of views, a bar a machine.
+
+    For depth of field also the theoretical optimum, as in its Figure 10.
+    """
     need_matplotlib()
     from matplotlib.figure import Figure
 
@@ -104,6 +112,9 @@ def save_chart(path: str | os.PathLike[str], rows: Rows) -> None:
         for x, top in zip(at, base, strict=True):
             axes.annotate(machine, (x, top), rotation=90, fontsize=7, ha="center", va="bottom", xytext=(0, 2),
                           textcoords="offset points")  # fmt: skip
+    best = {row["views"]: row["optimum"] / 1e6 for row in rows if row.get("optimum")}
+    if best:
+        axes.plot([counts.index(n) for n in best], list(best.values()), "k--o", label="theoretical optimum")
     axes.set_xticks(range(len(counts)), [str(n) for n in counts])
     axes.set_xlabel("views")
     axes.set_ylabel("MB a frame")

@@ -90,8 +90,8 @@ class Pass:
         capacity = max(MIN_FRAGMENTS, view.width * machine.traversal.tile[1] * count)
         self.fragments = _fragments(capacity, views)
         self.target = Target(
-            self.color, pictures.total, np.zeros((capacity, 4), np.float32), np.zeros(views, np.int64),
-            pictures.how, pictures.misses,
+            self.color, self.depth, pictures.total, np.zeros((capacity, 4), np.float32), np.zeros(capacity),
+            np.zeros(views, np.int64), pictures.how, pictures.misses,
         )  # fmt: skip
         self.plan = _plan(machine, span, views)
         # the copy of the colour buffer's cache that runs ahead, where approximations are taken from it
@@ -125,11 +125,21 @@ class Pass:
 
     def _draw_views(self, plan: Plan, setting: Setting) -> None:
         for draw in self.workload.draws:
-            depth_write = draw.depth_write and setting.depth_test == state.LESS
-            self._draw(draw, plan._replace(depth_test=setting.depth_test, depth_write=depth_write), setting)
+            late = draw.depth_output
+            changed = plan._replace(
+                depth_test=setting.depth_test, depth_write=draw.depth_write and setting.depth_test == state.LESS,
+                late=late, z_max=plan.z_max and not late, z_min=plan.z_min and not late,
+                # the colour buffer has no depths to interpolate
+                approximate=plan.approximate and draw.approximate and not (late and plan.from_buffer),
+                from_buffer=plan.from_buffer and not late,
+            )  # fmt: skip
+            self._draw(draw, changed, setting)
+            if plan.from_buffer and late:  # what went through the colour buffer's cache was not known ahead
+                for mine, real in zip(self.shadow.cache, self.color.cache, strict=True):
+                    mine[:] = real
 
     def _draw(self, draw: Draw, plan: Plan, setting: Setting) -> None:
-        work, shade = self._work(draw, setting)
+        work, shade = self._work(draw, plan, setting)
         cursor = self.fragments.cursor
         cursor[:] = 0, 0, 0, 0, cursor[state.BASE]
         done = False
@@ -137,12 +147,12 @@ class Pass:
             done = raster.rasterize(
                 work.corners, draw.facing, self.view, plan, self.depth, self.shadow, self.fragments, self.scratch
             )
-            if setting.color and cursor[state.COUNT]:
+            if (setting.color or plan.late) and cursor[state.COUNT]:
                 shade(self.fragments, work, self.view, self.memory, self.target)
             cursor[state.BASE] += cursor[state.COUNT]
             cursor[state.COUNT] = 0
 
-    def _work(self, draw: Draw, setting: Setting) -> tuple[Work, Callable[..., Any]]:
+    def _work(self, draw: Draw, plan: Plan, setting: Setting) -> tuple[Work, Callable[..., Any]]:
         key = id(draw)
         if key not in self._eye_space:
             corners = draw.corners @ self.eye_from_world[:3, :3].T + self.eye_from_world[:3, 3]
@@ -167,7 +177,8 @@ class Pass:
         units = np.array(draw.textures, np.int64)
         work = Work(
             corners, attributes, derivatives, draw.mirrored, number, uniforms, units, blend, float(setting.weight),
-            options.unified_camera, from_buffer, np.zeros((3, attributes.shape[2])), np.zeros((5, 4)), np.zeros((3, 3)),
+            options.unified_camera, from_buffer, plan.late, plan.depth_test == state.EQUAL, plan.depth_write,
+            setting.color, np.zeros((3, attributes.shape[2])), np.zeros((5, 5)), np.zeros((3, 3)),
         )  # fmt: skip
         return work, shade
 
@@ -244,7 +255,7 @@ def _plan(machine: Machine, span: tuple[int, int], views: int) -> Plan:
         members = [np.nonzero(group[first:last] == g)[0] + first for g in range(sets)]
         exact[:] = [(m[0] + m[-1]) // 2 for m in members]
     return Plan(
-        *traversal.tile, order, first, last, machine.depth.z_max, machine.depth.z_min, state.LESS, True,
+        *traversal.tile, order, first, last, machine.depth.z_max, machine.depth.z_min, state.LESS, True, False,
         options.approximate, group, exact, options.tiles, options.filter == "tent",
         options.single_neighbour == "use", options.approximate and options.source == "color-buffer",
     )  # fmt: skip

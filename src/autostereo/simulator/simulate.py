@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..display.rig import Rig
-from ..errors import InputError
+from ..errors import InputError, UnsupportedError
 from ..scene.scene import Scene
 from .kernels import buffers
 from .kernels import state as layout
@@ -22,7 +22,7 @@ from .report import COUNTERS, Report
 from .textures import BC1_BYTES
 from .workload import Workload
 
-MAX_SIDE, MAX_VIEWS = 8192, 256
+MAX_SIDE, MAX_VIEWS, MAX_PIXELS = 8192, 256, 1 << 28  # pixels of all views: some 4 GB
 SIZE = (640, 480)
 T = TypeVar("T")
 R = TypeVar("R")
@@ -85,6 +85,8 @@ def simulate_accumulation(
     """
     if not rigs:
         raise InputError("rigs: expected at least one")
+    if machine.shading.approximate and machine.shading.source == "color-buffer":
+        raise UnsupportedError("machine shading.source: a colour buffer that accumulates holds no colours to reuse")
     samples = sum(rig.views for rig in rigs)
     workload = _checked(scene, rigs[0], machine, size)
     pictures = Pictures.common(size, workload.background)
@@ -119,15 +121,24 @@ def in_parallel(items: Iterable[T], work: Callable[[T], R]) -> list[R]:
         return list(pool.map(work, items))
 
 
+def check_size(views: int, size: tuple[int, int]) -> None:
+    """Raise InputError unless the simulator takes so many views of this size."""
+    if not 1 <= views <= MAX_VIEWS:
+        raise InputError(f"rig views: the simulator takes 1 to {MAX_VIEWS}, got {views}")
+    if len(size) != 2 or not all(1 <= side <= MAX_SIDE for side in size):
+        raise InputError(f"size: expected sides from 1 to {MAX_SIDE}, got {size}")
+    if views * size[0] * size[1] > MAX_PIXELS:
+        raise InputError(
+            f"size: the simulator takes {MAX_PIXELS} pixels in all views, got {views} of {size[0]}×{size[1]}"
+        )
+
+
 def _checked(scene: Scene | Workload, rig: Rig, machine: Machine, size: tuple[int, int]) -> Workload:
     if not isinstance(machine, Machine):
         raise InputError(f"machine: expected a Machine, got {type(machine).__name__}")
     if not isinstance(rig, Rig):
         raise InputError(f"rig: expected a Rig, got {type(rig).__name__}")
-    if not 1 <= rig.views <= MAX_VIEWS:
-        raise InputError(f"rig views: the simulator takes 1 to {MAX_VIEWS}, got {rig.views}")
-    if len(size) != 2 or not all(1 <= side <= MAX_SIDE for side in size):
-        raise InputError(f"size: expected sides from 1 to {MAX_SIDE}, got {size}")
+    check_size(rig.views, size)
     machine.check_size(size)
     workload = scene if isinstance(scene, Workload) else Workload.of(Scene.of(scene))
     prepare_textures(workload, machine)  # once, before frames run side by side

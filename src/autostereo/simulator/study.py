@@ -68,7 +68,9 @@ class Study:
                 if exact is None:
                     exact = simulate(workload, rig, _exact(machine), size=self.size)
                 quality = report.psnr(exact)
-            rows.append(figures_of(report, machine, seconds, quality))
+            triangles = max(1, sum(len(draw.corners) for draw in workload.draws))
+            size = {"pixels_per_triangle": float(report.covered.sum() / (views * triangles))}
+            rows.append(figures_of(report, machine, seconds, quality) | size)
             progress()
         return rows
 
@@ -100,6 +102,9 @@ def figures_of(report: Report, machine: Machine, seconds: float, quality: Any = 
         "horizon_rows": counters["horizon_rows"] / max(1, counters["rows"]),
         "texels_per_second": counters["texels"] / seconds,
         "seconds": seconds,
+        "counters": report.counters,
+        "share_of_view": report.share_approximated.tolist(),
+        "psnr_of_view": [None] * report.views if quality is None else [q if np.isfinite(q) else None for q in quality],
         "model": compare(report),
     }  # fmt: skip
 
@@ -109,14 +114,22 @@ def _summary(figures: list[dict[str, Any]]) -> dict[str, Any]:
     row = dict(figures[0])
     for key, value in figures[0].items():
         if isinstance(value, float) or key in (*CLASSES, "shaded", "approximated", "psnr", "psnr_min"):
-            known = [f[key] for f in figures if f[key] is not None]
-            row[key] = float(np.mean(known)) if known else None
+            row[key] = _mean([f[key] for f in figures])
+    for key in ("share_of_view", "psnr_of_view"):
+        row[key] = [_mean(list(of_view)) for of_view in zip(*(f[key] for f in figures), strict=True)]
+    row["counters"] = {name: _mean([f["counters"][name] for f in figures]) for name in figures[0]["counters"]}
     row["frames"] = len(figures)
     for key in CLASSES:
         row[f"{key}_range"] = [float(min(f[key] for f in figures)), float(max(f[key] for f in figures))]
     if "model" in row:
         row["model"] = _mean_model(figures)
     return row
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    """The mean of what is known."""
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None
 
 
 def _mean_model(figures: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
@@ -151,7 +164,11 @@ class FieldStudy:
     size: tuple[int, int] = SIZE
 
     def run(self, progress: Callable[[], None] = lambda: None) -> list[dict[str, Any]]:
-        """One row for each machine and number of views that it draws at once."""
+        """One row for each machine and number of views that it draws at once.
+
+        "optimum": the bytes of a multi-view machine if in each pass all views but one cost no texture and no colour
+        (section 6.1), as far as it was also run with one view at once.
+        """
         cases = [(machine, views) for views in self.views for machine in self.machines]
 
         def one(case: tuple[Machine, int]) -> list[dict[str, Any]]:
@@ -168,7 +185,13 @@ class FieldStudy:
                 progress()
             return rows
 
-        return [_summary(figures) for figures in in_parallel(cases, one)]
+        rows = [_summary(figures) for figures in in_parallel(cases, one)]
+        multi = {machine.name for machine in self.machines if machine.traversal.order != "by-view"}
+        single = {row["machine"]: row for row in rows if row["views"] == 1 and row["machine"] in multi}
+        for row in rows:
+            base = single.get(row["machine"])
+            row["optimum"] = base and base["depth"] + (base["texture"] + base["color"]) / row["views"]
+        return rows
 
 
 def lens(rig: Rig, samples: tuple[int, int], aperture: float) -> list[Rig]:

@@ -20,12 +20,12 @@ from .textures import Texture
 Array = NDArray[np.float64]
 SHADERS = {
     "surface": (shaders.SURFACE, 2), "level": (shaders.LEVEL, 4), "shadows": (shaders.SHADOWS, 2),
-    "ocean": (shaders.OCEAN, 2), "plain": (shaders.PLAIN, 0),
+    "ocean": (shaders.OCEAN, 2), "plain": (shaders.PLAIN, 0), "relief": (shaders.RELIEF, 4),
 }  # fmt: skip  # name: number, attributes whose changes per pixel it needs
 BLENDS = ("replace", "alpha", "add", "multiply")
 # attributes that are positions or directions in eye space, by their first column
-POSITIONS = {"surface": (8,), "shadows": (8,), "ocean": (2,)}
-DIRECTIONS = {"surface": (5,), "shadows": (2, 5)}
+POSITIONS = {"surface": (8,), "shadows": (8,), "ocean": (2,), "relief": (7,)}
+DIRECTIONS = {"surface": (5,), "shadows": (2, 5), "relief": (4,)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +49,11 @@ class Draw:
     mirrored : bool
         The front is clockwise.
     depth_write : bool
+    depth_output : bool
+        The shader gives the depth ("relief", or one of your own). The depth test then follows shading, so everything
+        covered is shaded, and Z-max and Z-min culling are off.
+    approximate : bool
+        False: shaded exactly on machines that approximate, as suits what depends on the view (section 4.3).
     derivatives : int, optional
         Own shaders: so many attributes, from the first, get changes per pixel; None: all.
     """
@@ -62,6 +67,8 @@ class Draw:
     facing: int = 0
     mirrored: bool = False
     depth_write: bool = True
+    depth_output: bool = False
+    approximate: bool = True
     derivatives: int | None = None
 
     def __post_init__(self) -> None:

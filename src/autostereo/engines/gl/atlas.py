@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..constants import ATLAS_VIEWS
-from .context import Device, Limits
+from .context import CLIP_DISTANCES, Device, Limits
 
 MAX_PIXELS = 2**26  # of an atlas: with colour and depth half a gigabyte
-CLIP_DISTANCE = 0x3000  # GL_CLIP_DISTANCE0
 
 
 @dataclass(frozen=True)
@@ -114,5 +113,5 @@ def read_into(framebuffer: Any, out: NDArray[np.uint8], box: tuple[int, int, int
 
 def enable_clipping(ctx: Any, on: bool) -> None:
     """Switch the four clip distances that cut tiles."""
-    for k in range(4):
-        (ctx.enable_direct if on else ctx.disable_direct)(CLIP_DISTANCE + k)
+    for distance in CLIP_DISTANCES:
+        (ctx.enable_direct if on else ctx.disable_direct)(distance)

@@ -27,20 +27,55 @@ VERSIONS = (460, 450, 440, 430, 420, 410, 400, 330)  # asked for in turn; 330 so
 GL_VERSION = 400  # double precision in shaders, which view maps need (lib/viewmap.glsl)
 DEBIAN_PACKAGES = "libegl1 libgl1-mesa-dri libgl1"
 SOFTWARE = ("llvmpipe", "softpipe", "swiftshader", "software rasterizer")
+ADD = 0x8006  # GL_FUNC_ADD
+CLIP_DISTANCES = range(0x3000, 0x3004)  # GL_CLIP_DISTANCE0 … 3, which cut tiles
+LIGHT_NUMBERS, OTHER_UNIFORMS = 8, 400  # numbers of a light; of what else shaders are told, at most
 GPU_NODES = ("/dev/dri", "/dev/nvidiactl", "/dev/dxg", "/dev/mali0", "/dev/kgsl-3d0")  # one is there if a GPU is
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a device can hold: sides of textures in pixels and voxels, bytes of a buffer, invocations of a group."""
+    """What a device can hold, where it may be less than something needs.
+
+    Attributes
+    ----------
+    texture, texture_3d : int
+        Sides in pixels and voxels.
+    buffer, storage : int
+        Bytes of a buffer, and of one that shaders read as a whole.
+    uniforms, vertex_outputs : int
+        Numbers that a stage is told, and that a vertex hands on to its samples.
+    draw_buffers, geometry_vertices, vertex_buffers : int
+        Render targets, vertices that a geometry shader puts out, storage buffers of vertex shaders.
+    """
 
     texture: int
     texture_3d: int
     buffer: int
-    uniform_block: int
+    storage: int
+    uniforms: int
+    vertex_outputs: int
     draw_buffers: int
     geometry_vertices: int
     vertex_buffers: int
+
+    @staticmethod
+    def of(info: dict[str, Any], software: bool) -> Limits:
+        """From what a context tells of itself; what it does not tell is what OpenGL 4 promises."""
+        stages = ("VERTEX", "FRAGMENT", "COMPUTE")
+        buffer = 2**31 - 1  # moderngl's sizes are ints
+        return Limits(
+            texture=min(info["GL_MAX_TEXTURE_SIZE"], *info["GL_MAX_VIEWPORT_DIMS"]),
+            texture_3d=info["GL_MAX_3D_TEXTURE_SIZE"],
+            buffer=buffer,
+            # llvmpipe tells 2²⁷, and reads all
+            storage=buffer if software else min(buffer, info.get("GL_MAX_SHADER_STORAGE_BLOCK_SIZE", 2**24) or 2**24),
+            uniforms=min(info.get(f"GL_MAX_{stage}_UNIFORM_COMPONENTS", 0) or 1024 for stage in stages),
+            vertex_outputs=min(info.get("GL_MAX_VERTEX_OUTPUT_COMPONENTS", 64), 4 * info["GL_MAX_VARYING_VECTORS"]),
+            draw_buffers=info["GL_MAX_DRAW_BUFFERS"],
+            geometry_vertices=info["GL_MAX_GEOMETRY_OUTPUT_VERTICES"],
+            vertex_buffers=info.get("GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS", 0),
+        )
 
 
 @dataclass(eq=False)
@@ -71,7 +106,7 @@ class Device:
     @property
     def is_hardware(self) -> bool:
         """Whether a GPU draws, and not the CPU in its stead."""
-        return not any(name in self.renderer.lower() for name in SOFTWARE)
+        return not is_software(self.renderer)
 
     @cached_property
     def programs(self) -> Programs:
@@ -79,6 +114,13 @@ class Device:
         from .programs import Programs
 
         return Programs(self)
+
+    @cached_property
+    def filters_coarsely(self) -> bool:
+        """Whether textures are interpolated with weights of a few bits, as GPUs do; the device has to be entered."""
+        from .filtering import interpolates_coarsely
+
+        return interpolates_coarsely(self)
 
     def __enter__(self) -> Device:
         self._lock.acquire()
@@ -106,9 +148,17 @@ class Device:
         self._entered -= 1
         try:
             if self._entered == 0:
+                if error is not None:
+                    self._restore()
                 self.ctx.__exit__(kind, error, trace)
         finally:
             self._lock.release()
+
+    def _restore(self) -> None:
+        """What drawing relies on, if an error came amid a drawing that had set it otherwise."""
+        self.ctx.blend_equation, self.ctx.depth_func = ADD, "<"
+        for distance in CLIP_DISTANCES:
+            self.ctx.disable_direct(distance)
 
     @contextmanager
     def without_reading(self) -> Iterator[None]:
@@ -144,6 +194,25 @@ class Device:
                 f"{self.limits.texture} pixels a side ({self.renderer}): choose a smaller size or engine='cpu'"
             )
 
+    def check_lights(self, count: int) -> None:
+        """Raise UnsupportedError when shaders cannot be told of so many lights."""
+        most = (self.limits.uniforms - OTHER_UNIFORMS) // LIGHT_NUMBERS
+        if count > most:
+            raise UnsupportedError(
+                f"{count} lights are more than shaders of this device can be told of, {most} ({self.renderer}): "
+                "choose fewer, or engine='cpu'"
+            )
+
+    def bind_storage(self, buffer: Any, binding: int) -> None:
+        """Bind a buffer of an object for shaders to read, or raise UnsupportedError when they cannot read all of it."""
+        size, most = buffer.size, self.limits.storage
+        if size > most:
+            raise UnsupportedError(
+                f"an object takes {size / 1e6:.0f} MB, shaders of this device read {most / 1e6:.0f} MB "
+                f"({self.renderer}): split it, or choose another method or engine='cpu'"
+            )
+        buffer.bind_to_storage_buffer(binding)
+
     def upload(self, data: Any) -> Any:
         """A buffer that holds an array of the scene; its bytes are counted."""
         raw = data.tobytes()
@@ -158,6 +227,11 @@ class Device:
 
 def _dotted(version: int) -> str:
     return f"{version // 100}.{version // 10 % 10}"
+
+
+def is_software(renderer: str) -> bool:
+    """Whether a renderer of this name is the CPU."""
+    return any(name in renderer.lower() for name in SOFTWARE)
 
 
 _lock = threading.Lock()
@@ -205,17 +279,8 @@ def _make() -> Device:
         raise DependencyError("engine gl needs moderngl: pip install autostereo[gl]") from None
     ctx = _newest_context(moderngl)
     ctx.gc_mode = "context_gc"
-    info = ctx.info
-    limits = Limits(
-        texture=min(info["GL_MAX_TEXTURE_SIZE"], *info["GL_MAX_VIEWPORT_DIMS"]),
-        texture_3d=info["GL_MAX_3D_TEXTURE_SIZE"],
-        buffer=2**31 - 1,  # moderngl's sizes are ints
-        uniform_block=info["GL_MAX_UNIFORM_BLOCK_SIZE"],
-        draw_buffers=info["GL_MAX_DRAW_BUFFERS"],
-        geometry_vertices=info["GL_MAX_GEOMETRY_OUTPUT_VERTICES"],
-        vertex_buffers=info.get("GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS", 0),
-    )
-    device = Device(ctx, ctx.version_code, info["GL_RENDERER"], limits)
+    info, renderer = ctx.info, ctx.info["GL_RENDERER"]
+    device = Device(ctx, ctx.version_code, renderer, Limits.of(info, is_software(renderer)))
     _release_current()
     device.require(GL_VERSION, "engine gl")
     return device

@@ -111,6 +111,7 @@ class GlEngine:
                 raise UnsupportedError(f"engine gl draws {names}, the scene holds a {type(item).__name__}")
         middle = scene.bounds.mean(axis=0)
         with self.device as device:
+            device.check_lights(len(scene.lights or ()))
             return Prepared(scene, middle, make_stages(device, scene, middle), Blocks(device))
 
     def update(self, prepared: Prepared, scene: Scene) -> Prepared:

@@ -120,12 +120,23 @@ class Job:
         return self.kept.get(
             ("vertex array", *map(id, parts)),
             parts,
-            lambda: make(program, content, index_buffer=indices, skip_errors=True),
+            lambda: make(program, [read_by(program, *item) for item in content], index_buffer=indices),
         )
 
     def cover(self, program: Any) -> None:
         """Draw one triangle that covers the target."""
         self.vertex_array(program, []).render(vertices=3)
+
+
+def read_by(program: Any, buffer: Any, formats: str, *names: str) -> tuple[Any, ...]:
+    """A buffer, its attributes' formats and names for a vertex array, without those that the program does not read.
+
+    Drivers drop what does not reach the picture, such as normals where there is no light. moderngl's `skip_errors`
+    then takes gl_InstanceID for them, which drivers list as an attribute without a place: GL_INVALID_VALUE.
+    """
+    each = formats.split()
+    kept = [part if name in program else part.replace("f", "x") for part, name in zip(each, names, strict=True)]
+    return buffer, " ".join(kept), *(name for name in names if name in program)
 
 
 class Stage:

@@ -31,6 +31,7 @@ VIEW_TRIANGLE, QUAD_TRIANGLE, QUAD_FRAGMENT = 0.28e-6, 11e-6, 28e-9
 ONE_MINUS_SRC1_COLOR = 0x88FA  # GL_ONE_MINUS_SRC1_COLOR: a channel is replaced where the second output is 1
 GEOMETRY_NUMBERS = 1024  # that one geometry shader may put out: OpenGL promises no more
 POSITION_NUMBERS = 9  # position, four clip distances, camera offset
+QUAD_NUMBERS = 24  # what quad.vert hands on but for its three surfaces, and the position
 
 
 class Meshes(Stage):
@@ -113,12 +114,12 @@ class Meshes(Stage):
         ctx.blend_func = ctx.ONE, ONE_MINUS_SRC1_COLOR
         depth = {"ONE_DEPTH": job.one_depth, "MEAN_DEPTH": job.draw.options.alpha == "averaged"}
         for part in self._parts:
-            program = job.masked_program(
-                "quad.vert", "quad.frag", defines={**switches(job, part), **depth}, version=430
-            )
+            defines = {**switches(job, part), **depth}
+            check_outputs(job, defines)
+            program = job.masked_program("quad.vert", "quad.frag", defines=defines, version=430)
             set_material(program, job, part)
-            part.vertices.bind_to_storage_buffer(0)
-            part.indices.bind_to_storage_buffer(1)
+            job.device.bind_storage(part.vertices, 0)
+            job.device.bind_storage(part.indices, 1)
             program["reach"] = job.draw.culling
             quads = job.vertex_array(program, [], job.kept.get("quads", self._most, lambda: self._quads(job.device)))
             for tile in range(job.count):
@@ -163,8 +164,7 @@ def copies_at_once(job: Job, defines: Defines, views: int) -> int:
     UnsupportedError
         More are asked for by `Options.views_per_pass`.
     """
-    own = 10 if defines["VERTEX_LIGHTING"] else 6  # numbers of lib/surface.glsl, at most
-    numbers = POSITION_NUMBERS + own + 3 * bool(defines["PLACED"]) + 2 * bool(defines["TEXTURED"])
+    numbers = POSITION_NUMBERS + numbers_of_surface(defines)
     most = min(GEOMETRY_NUMBERS // numbers, job.device.limits.geometry_vertices) // 3
     asked = job.draw.options.views_per_pass
     if asked is not None and min(asked, views) > most:
@@ -173,6 +173,21 @@ def copies_at_once(job: Job, defines: Defines, views: int) -> int:
             f"{GEOMETRY_NUMBERS} numbers: choose fewer, or None"
         )
     return min(views, most)
+
+
+def numbers_of_surface(defines: Defines) -> int:
+    """How many numbers a vertex hands on of its Surface (lib/surface.glsl), at most."""
+    return (10 if defines["VERTEX_LIGHTING"] else 6) + 3 * bool(defines["PLACED"]) + 2 * bool(defines["TEXTURED"])
+
+
+def check_outputs(job: Job, defines: Defines) -> None:
+    """Raise UnsupportedError when covering quads have more to hand on to samples than the device can."""
+    numbers, most = QUAD_NUMBERS + 3 * numbers_of_surface(defines), job.device.limits.vertex_outputs
+    if numbers > most:
+        raise UnsupportedError(
+            f"method {job.draw.method!r}: vertices of such a mesh hand on {numbers} numbers, {most} at most on this "
+            f"device ({job.device.renderer}): choose lighting='sample', another method or engine='cpu'"
+        )
 
 
 def switches(job: Job, part: Part) -> Defines:

@@ -17,6 +17,7 @@ from .mesh_buffers import Part
 
 BLOCK_VIEWS = 4  # views of a tile (PMR 2020, section 4: 4×4×4 voxels)
 MAX_BLOCKS = 256  # of a pass: 8 bits of an entry
+MAX_SIDE = 4 * 2**12  # pixels of a picture: 12 bits of an entry for its tiles
 MAX_TRIANGLES = 2**20  # set up at a time; near clipping may double them
 MAX_SAMPLES = 2**25  # voxels, or sub-pixels, of a round
 MAX_ENTRIES = 2**24  # in the queue

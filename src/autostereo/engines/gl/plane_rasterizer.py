@@ -28,11 +28,13 @@ from typing import Any
 
 import numpy as np
 
+from ...errors import UnsupportedError
 from .job import Job
 from .mesh import Meshes, set_material, switches
 from .plane_buffers import (
     BLOCK_VIEWS,
     MAX_BLOCKS,
+    MAX_SIDE,
     MAX_TRIANGLES,
     TRIANGLE_TEXELS,
     Corners,
@@ -49,7 +51,8 @@ from .programs import Defines
 
 METHODS = ("plane-rasterizer", "plane-rasterizer-n-pass", "plane-rasterizer-planar", "plane-rasterizer-staggered")
 VERSION = 430  # compute shaders and storage buffers
-BARRIERS = 0x2000 | 0x20 | 0x40 | 0x200  # of GL: SHADER_STORAGE, SHADER_IMAGE_ACCESS, COMMAND, BUFFER_UPDATE
+# of GL: SHADER_STORAGE, SHADER_IMAGE_ACCESS, COMMAND, BUFFER_UPDATE, and TEXTURE_UPDATE for what clears voxels
+BARRIERS = 0x2000 | 0x20 | 0x40 | 0x200 | 0x100
 GROUP = 64  # invocations of a work group
 GROUPS = 65535  # work groups in one direction, as many as every device has
 STAGES = ("clear", "vertices", "setup", "tiles", "depth", "winner", "encode")
@@ -114,12 +117,13 @@ class Drawing:
 
     def __init__(self, job: Job, parts: list[Any]) -> None:
         job.device.require(VERSION, f"method {job.draw.method!r}")
+        check_size(job)
         self.job, self.parts = job, parts
         kept, device = job.kept, job.device
         self.chunks = chunks(parts, MAX_TRIANGLES)
         self.numbers = np.cumsum([0, *(part.triangles for part in parts)])
         self.room = room = 2 * max(sum(piece[2] for piece in chunk) for chunk in self.chunks)
-        self.triangles = kept.get("plane triangles", room, lambda: Memory(device, TRIANGLE_TEXELS * room, 4, "f4"))
+        self.triangles = kept.get("plane triangles", room, lambda: Memory(device, TRIANGLE_TEXELS * room, 4, "u4"))
         self.queue = kept.get("plane queue", None, lambda: Queue(device))
         self.corners = kept.get("plane corners", None, self._send_corners)
         self.one_view = job.draw.method == "plane-rasterizer-n-pass"
@@ -135,7 +139,7 @@ class Drawing:
         for part in self.parts:
             corners = Corners(self.job.device, part)
             corners.triangles.bind(1)
-            part.indices.bind_to_storage_buffer(1)
+            self.job.device.bind_storage(part.indices, 1)
             program = self.job.program("plane_corners.comp", version=VERSION)
             _set(program, count=part.triangles)
             _run(program, part.triangles)
@@ -224,7 +228,7 @@ class Drawing:
             with _stage(self.job, "vertices"):
                 program = self.job.program("plane_vertex.comp", defines=switches(self.job, mesh), version=VERSION)
                 set_material(program, self.job, mesh)
-                mesh.vertices.bind_to_storage_buffer(1)
+                self.job.device.bind_storage(mesh.vertices, 1)
                 corners.points.bind(6)
                 corners.surfaces.bind(7)
                 _set(program, count=mesh.corners)
@@ -286,6 +290,16 @@ class Drawing:
                 _set(program, **counts, sample_at=self.sample_at)
                 _set(program, range=(int(self.numbers[number]), mesh.triangles))
                 job.vertex_array(program, []).render(ctx.TRIANGLE_STRIP, vertices=4, instances=len(tiles))
+
+
+def check_size(job: Job) -> None:
+    """Raise UnsupportedError when the column or row of a tile is more than an entry of the queue has bits for."""
+    layout = job.atlas.layout
+    if max(layout.width, layout.height) > MAX_SIDE:
+        raise UnsupportedError(
+            f"method {job.draw.method!r}: pictures have at most {MAX_SIDE} pixels a side, "
+            f"this one {layout.width}×{layout.height}: choose a smaller size or single-pass"
+        )
 
 
 def _set(program: Any, **values: Any) -> None:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ...scene.points import Points
 from .atlas import Layout
-from .context import Device
+from .context import ADD, Device
 from .job import Job, Stage
 from .panel import Panel
 from .points_buffers import CONSTANTS, SurfelBuffers, give_draw
@@ -34,7 +34,7 @@ from .programs import Defines
 
 SHEET_PIXELS = 2**22  # of a sheet: with all its sums a third of a gigabyte for panels
 OFFSETS, STOPS, NEAREST, SUMS, WEIGHTS = range(5)  # texture units
-MIN, ADD = 0x8007, 0x8006  # GL_MIN, GL_FUNC_ADD
+MIN = 0x8007  # GL_MIN
 
 
 class Sheet:

@@ -44,10 +44,11 @@ class SurfelBuffers:
         points = np.concatenate(parts).astype(np.float32)
         points = points[space_filling_order(points[:, :3])]
         self.count = len(points)
-        if self.count * RECORD > device.limits.buffer:
+        most = min(device.limits.buffer, device.limits.storage) // RECORD
+        if self.count > most:
             raise UnsupportedError(
-                f"{self.count} points are more than a buffer of this device holds, {device.limits.buffer // RECORD} "
-                f"({device.renderer}): choose fewer, or engine='cpu'"
+                f"{self.count} points are more than a buffer of this device holds, {most} ({device.renderer}): "
+                "choose fewer, or engine='cpu'"
             )
         materials = [cloud.material for cloud in clouds]
         self.shiny = any(material.specular > 0 for material in materials)

@@ -57,6 +57,7 @@ class Rays(Stage):
     def __init__(self, device: Device, volumes: Sequence[Volume], middle: NDArray[np.float64]) -> None:
         mine = [v for v in volumes if (v.mode == "iso") == self.opaque]
         self._all = list(volumes)
+        self._coarse = device.filters_coarsely
         self._voxels = {id(v): send(device, v) for v in mine}
         self._looks = {id(v): Look(device, v, self._voxels[id(v)]) for v in mine}
         compose = [v for v in mine if v.mode == "composite"]
@@ -121,6 +122,7 @@ class Rays(Stage):
         on_panel, way = job.columns is not None, "slices" if by_slices(job, group) else group[0].mode
         defines: Defines = {
             **self._switches(job, group),
+            "COARSE": self._coarse,
             "PANEL": on_panel,
             "LANES": 1 if not on_panel or one_ray(job) else 3,
             "OPAQUE": beneath is not None and has_opaque(job),

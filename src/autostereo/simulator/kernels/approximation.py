@@ -14,6 +14,7 @@ import math
 
 import numpy as np
 
+from .buffers import block_of
 from .compiling import inlined
 from .geometry import slope_a, slope_b
 from .state import BASE, MAX_TAPS
@@ -31,7 +32,7 @@ def _cached(x, row, group, plan, view, color, fragments, scratch):
         return source
     if plan.from_buffer:
         y = fragments.y[source]
-        block = (scratch.exact[group] * color.down + y // color.block_h) * color.across + x // color.block_w
+        block = block_of(color, scratch.exact[group], x, y)
         if color.cache.slot_of[block] < 0 or fragments.cursor[BASE] + source < scratch.since[block]:
             return np.int64(-1)
     elif scratch.stamp[group, x // plan.tile_w] <= scratch.clock[group] - plan.entries:

@@ -136,6 +136,22 @@ def mark(buffer, slot, bit):
     buffer.dirty[slot] = True
 
 
+@inlined
+def passes(depth, block, slot, v, x, y, z, equal, write, trusted):
+    """Depth test of a pixel of the block in `slot`; `trusted`: it passes for certain, nothing need be read."""
+    bit = pixel_bit(depth, x, y)
+    if not trusted:
+        need(depth, block, slot, bit)
+    stored = depth.values[v, y, x]
+    if (z != stored) if equal else (z <= stored):
+        return False
+    if write:
+        depth.values[v, y, x] = z
+        depth.nearest[block] = max(depth.nearest[block], z)
+        mark(depth, slot, bit)
+    return True
+
+
 @kernel
 def flush(buffer):
     """Write everything back; the cache keeps its blocks, clean."""

@@ -2,7 +2,8 @@
 
 Hasselgren 2006, sections 4.1 to 4.3 and 5. All the tiles of a row of tiles are visited in all views before the next
 row: always that of the view with the least efficiency measure. Tiles of one pixel are the paper's scanline traversal.
-The depth test comes before shading, so that a list of the fragments that pass, in order, is all that shading needs.
+The depth test comes before shading, so that a list of the fragments that pass, in order, is all that shading needs;
+where shaders give the depths it comes after, and the list holds all that is covered.
 
 Errata, checked in tests/test_sim_raster.py: the one-axis measure of section 5, "simply the component of t", needs the
 sign of the traversal direction along that axis; without it (`UNSIGNED`) views whose coordinate falls along the row are
@@ -14,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from .approximation import find_taps
-from .buffers import HITS, enter, mark, need, pixel_bit
+from .buffers import HITS, block_of, enter, passes
 from .compiling import inlined, kernel
 from .geometry import evaluate, is_inside, set_edges, slope_a, slope_b
 from .lru import HIT, touch
@@ -119,7 +120,7 @@ def set_up(corners, facing, view, plan, scratch):
     return first, last
 
 
-@kernel
+@inlined
 def _columns(n, view, plan, scratch, y0):
     """Tiles left … right of each view that may meet the triangle in the row of tiles from y0. Returns their number."""
     tw, th = plan.tile_w, plan.tile_h
@@ -193,7 +194,7 @@ def _measure(view, plan, scratch, v, y0, du, dv):
     return e
 
 
-@kernel
+@inlined
 def _visit(v, tile, y0, triangle, view, plan, depth, color, fragments, scratch):
     """One tile of one view: coverage, depth test, and what becomes of the fragments that pass."""
     edges, side, det = scratch.edges[v], scratch.side[v], scratch.det[v]
@@ -202,7 +203,7 @@ def _visit(v, tile, y0, triangle, view, plan, depth, color, fragments, scratch):
     a_row, b_column = view.a[v], view.b
     z_of_sum = view.near * Z_SCALE / det
     fragments.totals[TILES] += 1
-    block = (v * depth.down + y0 // depth.block_h) * depth.across + x0 // depth.block_w
+    block = block_of(depth, v, x0, y0)
     trusted = False  # Z-min: everything passes, nothing need be read
     if plan.z_max or plan.z_min:  # the tile lies within one block (machine.py)
         low, high = np.inf, -np.inf
@@ -241,35 +242,25 @@ def _visit(v, tile, y0, triangle, view, plan, depth, color, fragments, scratch):
             depth_z = total * z_of_sum
             if not 0.0 < depth_z <= Z_SCALE:
                 continue  # nearer than the near plane
-            z = np.uint32(min(depth_z, Z_MAX))
             of_view[COVERED] += 1
-            block = (v * depth.down + y // depth.block_h) * depth.across + x // depth.block_w
-            if block != current:
-                slot = np.int64(enter(depth, block))
-                current = block
-            else:
-                depth.counts[HITS] += 1
-            bit = pixel_bit(depth, x, y)
-            if not trusted:
-                need(depth, block, slot, bit)
-            stored = depth.values[v, y, x]
-            if plan.depth_test == EQUAL:
-                if z != stored:
+            if not plan.late:
+                z = np.uint32(min(depth_z, Z_MAX))
+                block = block_of(depth, v, x, y)
+                if block != current:
+                    slot = np.int64(enter(depth, block))
+                    current = block
+                else:
+                    depth.counts[HITS] += 1
+                if not passes(depth, block, slot, v, x, y, z, plan.depth_test == EQUAL, plan.depth_write, trusted):
                     continue
-            elif z <= stored:
-                continue
-            if plan.depth_write:
-                depth.values[v, y, x] = z
-                depth.nearest[block] = max(depth.nearest[block], z)
-                mark(depth, slot, bit)
-            of_view[PASSED] += 1
+                of_view[PASSED] += 1
             fragments.triangle[n] = triangle
             fragments.camera[n] = v
             fragments.x[n] = x
             fragments.y[n] = y
             fragments.tap_count[n] = 0
             if plan.from_buffer:
-                written = (v * color.down + y // color.block_h) * color.across + x // color.block_w
+                written = block_of(color, v, x, y)
                 if touch(color.cache, written) != HIT:
                     scratch.since[written] = fragments.cursor[BASE] + n
             if is_exact:
@@ -323,7 +314,7 @@ def rasterize(corners, facing, view, plan, depth, color, fragments, scratch):
     return True
 
 
-@kernel
+@inlined
 def _row(triangle, y0, view, plan, depth, color, fragments, scratch):
     """All tiles of a row of tiles, in all views (TRAVERSESCANLINE of section 4.1)."""
     fragments.totals[ROWS] += 1

@@ -4,14 +4,16 @@ A shader is a function (at, dx, dy, eye, uniforms, memory, units, out):
 
 at, dx, dy : ndarray of shape (A,)
     Attributes at the sample, perspective-correct, and the changes per pixel in x and y of the first `derivatives`.
-eye : ndarray of shape (4,)
-    The eye (x, y, 0) to shade for, in the centre camera's eye space; eye[3] = 1 if the front is seen, −1 the back.
+eye : ndarray of shape (5,)
+    The eye (x, y, 0) to shade for, in the centre camera's eye space; eye[3] = 1 if the front is seen, −1 the back;
+    eye[4] the depth of the near plane.
 uniforms : ndarray of shape (U,)
 memory : TextureMemory
 units : ndarray of shape (number of textures,), int64
     The draw's textures.
-out : ndarray of shape (4,)
-    Colour and opacity, 0…1; clamped afterwards.
+out : ndarray of shape (5,)
+    Colour and opacity, 0…1; clamped afterwards. out[4] comes in as near/depth of the sample; in draws with
+    `depth_output` what it is afterwards, clamped to 0…1, is the fragment's depth.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ import numpy as np
 from .compiling import inlined, kernel
 from .textures import compare_depth, trilinear
 
-SURFACE, LEVEL, SHADOWS, OCEAN, PLAIN = range(5)
+SURFACE, LEVEL, SHADOWS, OCEAN, PLAIN, RELIEF = range(6)
 
 # Poisson-like points of the unit disc for soft shadows: the first eight are its rim (Uralsky 2005), 56 fill it
 _turns = np.arange(56) * 2.399963229728653  # golden angle
@@ -78,7 +80,8 @@ def surface(at, dx, dy, eye, uniforms, memory, units, out):
             hr += gloss * uniforms[i + 4]
             hg += gloss * uniforms[i + 5]
             hb += gloss * uniforms[i + 6]
-    out[:] = 1.0
+    for c in range(4):
+        out[c] = 1.0
     if len(units) > 0:
         _filtered(memory, units[0], at, dx, dy, 0, out)
     out[0] = out[0] * at[2] * r + hr
@@ -87,7 +90,7 @@ def surface(at, dx, dy, eye, uniforms, memory, units, out):
     out[3] = 1.0
 
 
-@kernel
+@inlined
 def level(at, dx, dy, eye, uniforms, memory, units, out):
     """Decal times light map, as games of 2000: two texture units. Attributes uv of both."""
     light = memory.colors[0]
@@ -96,6 +99,27 @@ def level(at, dx, dy, eye, uniforms, memory, units, out):
     for c in range(3):
         out[c] *= 2.0 * light[c]
     out[3] = uniforms[0]
+
+
+@kernel
+def relief(at, dx, dy, eye, uniforms, memory, units, out):
+    """Stones that stand out of a plane surface: as `level`, and with the depth of the raised surface.
+
+    A polygon with a depth for each texel (Schaufler, Nailboards, 1997). The decal's alpha is the height, ½ the surface
+    itself; the ray that meets the plane N·(X − eye) = c meets it at 1 + h/c times the depth where it is raised by h.
+    Attributes: uv of both, normal, position. uniforms: opacity, height from 0 to 1.
+    """
+    light = memory.colors[0]
+    _filtered(memory, units[0], at, dx, dy, 0, out)
+    _filtered(memory, units[1], at, dx, dy, 2, light)
+    height = (out[3] - 0.5) * uniforms[1]
+    for c in range(3):
+        out[c] *= 2.0 * light[c]
+    out[3] = uniforms[0]
+    nx, ny, nz = _unit(at[4], at[5], at[6])
+    distance = nx * (at[7] - eye[0]) + ny * (at[8] - eye[1]) + nz * (at[9] - eye[2])
+    if distance != 0.0:
+        out[4] /= min(max(1.0 + height / distance, 0.5), 2.0)
 
 
 @kernel
@@ -200,7 +224,7 @@ def ocean(at, dx, dy, eye, uniforms, memory, units, out):
     out[3] = 1.0
 
 
-@kernel
+@inlined
 def built_in(kind, at, dx, dy, eye, uniforms, memory, units, out):
     """The shader of that number. Those that are built in share one kernel, so that it can be kept compiled."""
     if kind == LEVEL:
@@ -209,6 +233,8 @@ def built_in(kind, at, dx, dy, eye, uniforms, memory, units, out):
         shadows(at, dx, dy, eye, uniforms, memory, units, out)
     elif kind == OCEAN:
         ocean(at, dx, dy, eye, uniforms, memory, units, out)
+    elif kind == RELIEF:
+        relief(at, dx, dy, eye, uniforms, memory, units, out)
     elif kind == SURFACE:
         surface(at, dx, dy, eye, uniforms, memory, units, out)
     else:  # PLAIN: the first uniforms

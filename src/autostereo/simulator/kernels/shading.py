@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .buffers import enter, mark, need, pixel_bit
+from .buffers import block_of, enter, mark, need, passes, pixel_bit
 from .compiling import inlined, kernel
 from .geometry import evaluate, set_edges
 from .shaders import built_in as shader
-from .state import COUNT
+from .state import COUNT, PASSED, Z_MAX, Z_SCALE
 from .textures import MISSES
 
 REPLACE, ALPHA, ADD, MULTIPLY, ACCUMULATE = range(5)  # Work.blend
@@ -39,7 +39,11 @@ class Work(NamedTuple):
         Shade for the centre camera in all views.
     from_buffer : bool
         Approximations take what is in the colour buffer, not what the shader gave.
-    sample : ndarray of shape (3, A); small : (5, 4); edges : (3, 3)
+    late, equal, depth_write : bool
+        The depth test that follows shading where the shader gives the depth.
+    color : bool
+        False: depths alone are drawn.
+    sample : ndarray of shape (3, A); small : (5, 5); edges : (3, 3)
         Memory to work in.
     """
 
@@ -54,6 +58,10 @@ class Work(NamedTuple):
     weight: float
     unified: bool
     from_buffer: bool
+    late: bool
+    equal: bool
+    depth_write: bool
+    color: bool
     sample: Any
     small: Any
     edges: Any
@@ -64,11 +72,13 @@ class Target(NamedTuple):
 
     Attributes
     ----------
-    buffer : Buffer
+    buffer, depth : Buffer
     total : ndarray of shape (H, W, 4), float32
         ACCUMULATE: the common colour buffer; else empty.
     colors : ndarray of shape (N, 4), float32
         What the shader, or the approximation, gave for each fragment of the list.
+    depths : ndarray of shape (N,), float64
+        The same of depth, as near/depth, where the shader gives it.
     runs : ndarray of shape (V,), int64
         Shader runs of each view.
     how : ndarray of shape (V, H, W), uint8
@@ -78,8 +88,10 @@ class Target(NamedTuple):
     """
 
     buffer: Any
+    depth: Any
     total: Any
     colors: Any
+    depths: Any
     runs: Any
     how: Any
     misses: Any
@@ -90,7 +102,7 @@ def put(color, v, x, y, blend, weight, target):
     """One fragment into the colour buffer; color (4,) becomes what a view's buffer holds then."""
     buffer = target.buffer
     plane = 0 if blend == ACCUMULATE else v
-    block = (plane * buffer.down + y // buffer.block_h) * buffer.across + x // buffer.block_w
+    block = block_of(buffer, plane, x, y)
     slot = enter(buffer, block)
     bit = pixel_bit(buffer, x, y)
     if blend != REPLACE:
@@ -121,6 +133,19 @@ def put(color, v, x, y, blend, weight, target):
     buffer.values[v, y, x] = word
 
 
+@inlined
+def _shown(n, v, x, y, fragments, work, target):
+    """Late depth test: whether fragment n is seen, at the depth that its shader gave."""
+    depth = target.depth
+    z = np.uint32(min(min(max(target.depths[n], 0.0), 1.0) * Z_SCALE, Z_MAX))
+    block = block_of(depth, v, x, y)
+    slot = enter(depth, block)
+    if not passes(depth, block, slot, v, x, y, z, work.equal, work.depth_write, False):
+        return False
+    fragments.of_view[v, PASSED] += 1
+    return True
+
+
 def _shade_fragments(fragments, work, view, memory, target):
     """Shade, or put together from their taps, all fragments of the list, and write them."""
     attributes = work.attributes
@@ -139,12 +164,18 @@ def _shade_fragments(fragments, work, view, memory, target):
             eye[0] = 0.0 if work.unified else view.offsets[v]
             eye[1] = view.offset_y
             eye[3] = 1.0 if (det > 0.0) != work.mirrored else -1.0
+            eye[4] = view.near
         if fragments.tap_count[n] > 0:
             out[:] = 0.0
             first = fragments.tap_first[n]
             for i in range(first, first + fragments.tap_count[n]):
                 for c in range(4):
                     out[c] += fragments.tap_weight[i] * target.colors[fragments.tap_source[i], c]
+            if work.late:
+                base = target.depths[fragments.tap_source[first]]
+                out[4] = base
+                for i in range(first + 1, first + fragments.tap_count[n]):
+                    out[4] += fragments.tap_weight[i] * (target.depths[fragments.tap_source[i]] - base)
         else:
             a, b = view.a[v, x], view.b[y]
             total = 0.0
@@ -163,6 +194,7 @@ def _shade_fragments(fragments, work, view, memory, target):
                 if j < work.derivatives:
                     dx[j] = wx[0] * p + wx[1] * q + wx[2] * r
                     dy[j] = wy[0] * p + wy[1] * q + wy[2] * r
+            out[4] = total * (view.near / det)
             before = memory.counts[MISSES]
             shader(work.shader, at, dx, dy, eye, work.uniforms, memory, work.units, out)
             for c in range(4):
@@ -170,10 +202,14 @@ def _shade_fragments(fragments, work, view, memory, target):
             target.runs[v] += 1
             if with_misses:
                 target.misses[v, y, x] += memory.counts[MISSES] - before
-        if with_map:
-            target.how[v, y, x] = APPROXIMATED if fragments.tap_count[n] > 0 else SHADED
         for c in range(4):
             target.colors[n, c] = out[c]
+        if work.late:
+            target.depths[n] = out[4]
+            if not _shown(n, v, x, y, fragments, work, target) or not work.color:
+                continue
+        if with_map:
+            target.how[v, y, x] = APPROXIMATED if fragments.tap_count[n] > 0 else SHADED
         put(out, v, x, y, work.blend, work.weight, target)
         if work.from_buffer:
             for c in range(4):

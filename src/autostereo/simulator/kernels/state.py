@@ -26,6 +26,7 @@ class Plan(NamedTuple):
     z_min: bool
     depth_test: int
     depth_write: bool
+    late: bool  # shaders give the depths: all that is covered is listed, and tested when it has been shaded
     approximate: bool
     group: Any  # (V,) int64: the set of each view
     exact: Any  # (groups,) int64: its exact view; −1: the one in which the triangle is largest

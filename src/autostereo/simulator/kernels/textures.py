@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .channels import filtered
 from .compiling import inlined
 from .lru import HIT, touch
 
@@ -87,14 +88,6 @@ def _wrap(i, n):
 
 
 @inlined
-def _mix(texels, a, b, c, d, k, s, t):
-    """Channel k of four texels, bilinearly."""
-    below = (1.0 - s) * texels[a, k] + s * texels[b, k]
-    above = (1.0 - s) * texels[c, k] + s * texels[d, k]
-    return (1.0 - t) * below + t * above
-
-
-@inlined
 def _bilinear(memory, number, u, v):
     """The four channels 0…255 of a level at (u, v)."""
     w, h = memory.levels[number, 1], memory.levels[number, 2]
@@ -109,10 +102,7 @@ def _bilinear(memory, number, u, v):
     texels, start = memory.texels, memory.levels[number, 0]
     a, b = start + r0 * w + x0, start + r0 * w + x1
     c, d = start + r1 * w + x0, start + r1 * w + x1
-    return (
-        _mix(texels, a, b, c, d, 0, s, t), _mix(texels, a, b, c, d, 1, s, t),
-        _mix(texels, a, b, c, d, 2, s, t), _mix(texels, a, b, c, d, 3, s, t),
-    )  # fmt: skip
+    return filtered(texels, a, b, c, d, s, t)
 
 
 @inlined

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from ...display.rig import Rig
 from ..workload import Workload
-from . import atrium, level, ocean, soft_shadows
+from . import atrium, level, ocean, relief, soft_shadows
 
 FRAMES = 200
 
@@ -44,4 +44,5 @@ SCENES = {
     "soft-shadows": AnimatedScene("soft-shadows", 0.03, soft_shadows.frame),
     "ocean": AnimatedScene("ocean", 0.15, ocean.frame),
     "atrium": AnimatedScene("atrium", 0.03, atrium.frame),
+    "relief": AnimatedScene("relief", 0.03, relief.frame),
 }

@@ -63,9 +63,9 @@ void emit(vec4 a, vec4 b, vec4 c, uint number) {
     bool large = (min(max(wide.x, wide.y), float(picture.x)) / 4.0 + 1.0) * ((last - first) / 4.0 + 1.0) > LARGE_TILES;
     uint slot = large ? uint(room) - 1u - atomicAdd(large_triangles, 1u) : atomicAdd(small_triangles, 1u);
     for (int k = 0; k < 3; ++k) {
-        imageStore(triangles, place_of(4u * slot + uint(k)), t.corner[k]);
+        imageStore(triangles, place_of(4u * slot + uint(k)), floatBitsToUint(t.corner[k]));
     }
-    imageStore(triangles, place_of(4u * slot + 3u), uintBitsToFloat(t.info));
+    imageStore(triangles, place_of(4u * slot + 3u), t.info);
 }
 
 void main() {

@@ -7,6 +7,7 @@
 #include "lib/cameras.glsl"
 #endif
 #include "lib/lanes.glsl"
+#include "lib/filtering.glsl"
 #include "lib/volume.glsl"
 #include "lib/volume_target.glsl"
 
@@ -27,7 +28,7 @@ void end_slab() {
 }
 
 vec4 color_of(float value) {
-    return value < 0.0 ? vec4(0.0) : textureLod(most_colors, vec2(value * most_place.x + most_place.y, 0.5), 0.0);
+    return value < 0.0 ? vec4(0.0) : looked_up(most_colors, vec2(value * most_place.x + most_place.y, 0.5));
 }
 
 void main() {

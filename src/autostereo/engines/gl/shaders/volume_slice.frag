@@ -8,6 +8,7 @@
 #endif
 #include "lib/shading.glsl"
 #include "lib/lanes.glsl"
+#include "lib/filtering.glsl"
 #include "lib/volume.glsl"
 #include "lib/volume_light.glsl"
 #include "lib/volume_target.glsl"

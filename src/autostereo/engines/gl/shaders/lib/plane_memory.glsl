@@ -4,7 +4,8 @@
 // Switches: those that a stage uses, as devices may have eight images a stage and no more.
 
 #ifdef TRIANGLES
-layout(rgba32f, binding = 0) uniform image2D triangles;    // four texels each: lib/plane_triangle.glsl
+// four texels each, as bits (lib/plane_triangle.glsl): whole numbers as floats would be denormal, which devices may flush
+layout(rgba32ui, binding = 0) uniform uimage2D triangles;
 #endif
 #ifdef ENTRIES
 layout(rgba32ui, binding = 1) uniform uimage2D entries;    // triangle; tile's column, row, block in 12, 12, 8 bits; coverage

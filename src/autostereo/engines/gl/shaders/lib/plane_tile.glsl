@@ -12,9 +12,9 @@ uniform bool find_depth;
 Triangle triangle_at(uint slot) {
     Triangle t;
     for (int k = 0; k < 3; ++k) {
-        t.corner[k] = imageLoad(triangles, place_of(4u * slot + uint(k)));
+        t.corner[k] = uintBitsToFloat(imageLoad(triangles, place_of(4u * slot + uint(k))));
     }
-    t.info = floatBitsToUint(imageLoad(triangles, place_of(4u * slot + 3u)));
+    t.info = imageLoad(triangles, place_of(4u * slot + 3u));
     return t;
 }
 

@@ -1,5 +1,6 @@
 // Volumes along the rays of a fragment, slab after slab: a stretch of depth between two slices, the same for all views
-// (Huebner 2007a, section 3.2; engines/reference/volume.py). Needs frame.glsl, lanes.glsl. Filled by volume_space.py.
+// (Huebner 2007a, section 3.2; engines/reference/volume.py). Needs frame.glsl, lanes.glsl, filtering.glsl. Filled by
+// volume_space.py.
 //
 // Switches: VOLUMES; HALVES, half-spaces of each.
 //
@@ -44,7 +45,7 @@ vec3 index_at(int v, float x, float t) {
 }
 
 vec4 voxel_at(int v, float x, float t) {
-    return textureLod(voxels[v], (index_at(v, x, t) + 0.5) / voxel_count[v], 0.0);
+    return interpolated(voxels[v], index_at(v, x, t), voxel_count[v]);
 }
 
 vec4 voxel_on_ray(int v, int l, float t) {

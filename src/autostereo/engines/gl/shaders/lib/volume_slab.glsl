@@ -1,7 +1,7 @@
 // Classification of a slab by a 2-D table of pre-integrated slabs (Engel 2001; scene/preintegration.py), and its light.
-// Needs volume.glsl, volume_light.glsl, volume_target.glsl. Switches: SHADED; MIDDLE: lit in its middle, at the price of a
-// lookup, else by the mean of the light at its ends; OWN_EYES: highlights are those of each ray's eye, else of the
-// centre's; HALF_DEPTH.
+// Needs filtering.glsl, volume.glsl, volume_light.glsl, volume_target.glsl. Switches: SHADED; MIDDLE: lit in its middle, at
+// the price of a lookup, else by the mean of the light at its ends; OWN_EYES: highlights are those of each ray's eye, else of
+// the centre's; HALF_DEPTH.
 //
 // A vec3 is of three lanes, each for its own channel, or of one ray's three channels: SHOWN is what one lane shows.
 
@@ -46,7 +46,7 @@ void begin_slab() {
 Classified classify(int v, int l, vec4 voxel) {
     Classified c;
     vec2 place = vec2(voxel.a, of(s_front[v], l)) * table_place[v].x + table_place[v].y;
-    c.texel = textureLod(slab_table[v], place, 0.0);
+    c.texel = looked_up(slab_table[v], place);
 #ifdef SHADED
     vec3 point = vec3(0.0), eye = vec3(0.0, lens.w, 0.0);
 #ifdef MIDDLE
