@@ -10,10 +10,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from autostereo.cli.benchmarks import harness, papers, papers_published, papers_studio, report, suite, workloads
-from autostereo.cli.benchmarks.papers_studio import PapersStudio, Way
+from autostereo.cli.benchmarks import harness, papers, papers_plane, papers_published, report, suite, workloads
+from autostereo.cli.benchmarks.papers_studio import PapersStudio, Way, on_cpu
 from autostereo.cli.benchmarks.suite import BenchOptions, Work
 from autostereo.display.display import Display
+from autostereo.engines.options import Options
 from autostereo.errors import DependencyError, InputError
 from autostereo.render import Renderer
 from autostereo.scene.scene import Scene
@@ -87,10 +88,35 @@ def test_nothing_failed_and_only_what_the_engine_lacks_is_not_available(measured
 
 
 def test_depth_image_based_rendering_has_its_rate_and_its_fidelity(measured):
-    for views in ("8 views", "48 views"):
-        for count in (2, 4):
-            assert found(measured, "2020-fig15", views, f"dibr, {count} references")["value"] > 0
-            assert 25 < found(measured, "2020-fig15", views, f"PSNR of dibr, {count} references")["value"] < 90
+    for views in (f"{n} views" for n in (8, 16, 48, 96)):
+        for way in ("dibr, 2 references", "dibr, 4 references"):
+            rate = {e: found(measured, "2020-fig15-dibr", views, f"{way}{e}")["value"] for e in ("", ", cpu engine")}
+            drawn = {e: found(measured, "2020-fig15-dibr", views, e)["value"] for e in ("single-pass", "cpu engine")}
+            ratio = found(measured, "2020-fig15-dibr", views, f"{way} / single-pass")["value"]
+            assert ratio == pytest.approx(drawn["single-pass"] / rate[""])
+            ratio = found(measured, "2020-fig15-dibr", views, f"{way}, cpu engine / cpu engine")["value"]
+            assert ratio == pytest.approx(drawn["cpu engine"] / rate[", cpu engine"])
+            all_of_them = found(measured, "2020-fig15-dibr", views, f"PSNR of {way}")["value"]
+            worst = found(measured, "2020-fig15-dibr", views, f"its worst view, {way}")["value"]
+            assert 15 < worst <= all_of_them < 90
+
+
+def test_fidelity_is_that_of_the_views():
+    """Beside a psnr of its own making; references alone are exact."""
+    need_device()
+    studio, scene = PapersStudio(quick(), silent), Scene((icosphere(3),))
+    rig = workloads.rig_for(scene, 5, SIZE)
+    for count in (2, 5):
+        way = Way("w", SIZE, rig, "dibr", options=Options(references=count))
+        overall, worst = papers_plane.fidelity(studio, "", "", scene, way)
+        exact = Renderer(scene, "gl").render_views(rig, SIZE).color[..., :3].astype(float)
+        stack = Renderer(scene, "gl").render_views(rig, SIZE, method="dibr", options=way.options).color[..., :3]
+        errors = ((stack - exact) ** 2).mean(axis=(1, 2, 3))
+        if count == 5:
+            assert (overall.value, worst.value) == (100, 100)
+        else:
+            assert overall.value == pytest.approx(10 * np.log10(255**2 / errors.mean()))
+            assert worst.value == pytest.approx(10 * np.log10(255**2 / errors.max()))
 
 
 def test_ours_stands_beside_what_is_printed(measured):
@@ -257,6 +283,15 @@ def test_pictures_stay_on_the_device_only_meanwhile():
         assert (way.draw(renderer, out) == wanted).all()
 
 
+def test_references_are_read_back_nevertheless():
+    """What is warped on the CPU has to be there: its picture is the same whether others are read or not."""
+    device, scene = need_device(), Scene((icosphere(2),))
+    way, renderer = Way("", SIZE, workloads.rig_for(scene, 8, SIZE), "dibr"), Renderer(scene, "gl")
+    wanted = way.draw(renderer).copy()
+    with device.without_reading():
+        assert (way.draw(renderer, np.zeros_like(wanted)) == wanted).all()
+
+
 def test_cpu_columns_are_drawn_by_the_cpu():
-    way = papers_studio.on_cpu(Way("x", SIZE, workloads.rig_for(Scene((icosphere(1),)), 2, SIZE), "geometry-shader"))
+    way = on_cpu(Way("x", SIZE, workloads.rig_for(Scene((icosphere(1),)), 2, SIZE), "geometry-shader"))
     assert (way.name, way.engine, way.method) == ("cpu engine", "cpu", "single-pass")

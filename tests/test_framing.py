@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import autostereo as aus
 from autostereo.display.display import Display
-from autostereo.display.framing import MARGIN, depth_budget, frame_rig
+from autostereo.display.framing import MARGIN, depth_budget, frame_depths, frame_rig
 from autostereo.display.rig import Rig
 
 NAMES = [
@@ -228,3 +228,26 @@ def test_a_real_scene_is_framed() -> None:
     mesh = aus.Mesh(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.5]]), np.array([[0, 1, 2]]))
     rig = Rig.frame(aus.Scene(mesh), Display.preset("looking-glass-portrait"))
     assert rig.position[:2] == (0.5, 0.5) and rig.target == (0.5, 0.5, 0.25)
+
+
+# --- pictures with depth ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("display", DISPLAYS, ids=lambda d: d.name)
+@pytest.mark.parametrize(("near", "far"), [(1.0, 1.0), (0.5, 40.0), (2.0, 2.25)])
+def test_depths_of_a_picture_are_comfortable_and_balanced(display, near, far):
+    """What lies between the hundredth and the ninety-ninth per cent; neither an outlier nor the sky counts."""
+    rng = np.random.default_rng(0)
+    depth = np.full((40, 50), np.inf, np.float32)
+    depth[:30] = rng.permutation([near] * 745 + [far] * 745 + [1e-3] * 5 + [1e6] * 5).reshape(30, 50)
+    rig = frame_depths(depth, display, 50.0)
+    assert (rig.fov_y, rig.views, rig.aspect) == (50.0, display.views, display.aspect)
+    assert 1 / rig.focal == pytest.approx((1 / near + 1 / far) / 2)
+    assert rig.baseline <= 2 * rig.focal * math.tan(math.radians(display.cone_deg) / 2) * (1 + 1e-9)
+    budget = depth_budget(np.array([[-1, -1, -far], [1, 1, -near]]), display, rig)
+    assert budget.fits and budget.disparity_near == pytest.approx(-budget.disparity_far, abs=1e-9)
+
+
+def test_a_picture_without_depths_cannot_be_framed():
+    with pytest.raises(aus.InputError, match="depth: expected some finite depths, found none"):
+        frame_depths(np.full((2, 2), np.inf, np.float32), DISPLAYS[0], 50.0)

@@ -192,6 +192,18 @@ def test_points_are_those_of_the_reference():
     assert (np.abs(found.astype(int) - expected) > 1).mean() < 5e-3
 
 
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_warped_rows_stay_in_bounds(count):
+    """Whatever the depths are: from the least that a float32 holds to infinity."""
+    rng = np.random.default_rng(count)
+    depth = rng.choice(np.array([1e-45, 1e-3, 1.0, 3.9, 4.0, 1e3, 3e38, np.inf], np.float32), (count, H, W))
+    color = rng.integers(0, 256, (count, H, W, 4)).astype(np.uint8)
+    found = aus.warp(aus.ViewStack(color, depth), RIG, np.linspace(-0.4, 0.3, count))
+    assert found.depth is not None and (found.depth > 0).all()
+    exact, near = (aus.render_views(scene("plain"), RIG, SIZE, method=m, engine="cpu") for m in ("n-pass", "dibr"))
+    np.testing.assert_array_equal(near.color[[0, 2]], exact.color[[0, 2]])
+
+
 @pytest.mark.parametrize("flips", [(False, False), (True, True)])
 @pytest.mark.parametrize("display", [*DISPLAYS.values(), CONTINUOUS], ids=lambda d: d.name)
 def test_gathering_is_that_of_the_reference(display, flips):

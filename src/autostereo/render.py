@@ -27,6 +27,7 @@ from .scene.volume import Volume
 
 MAX_SIDE = 65536
 MAX_VIEWS = 4096
+FARTHEST = 1e30  # of a camera's offset, as in Rig
 
 
 def render(
@@ -261,21 +262,26 @@ def warp(pictures: ViewStack, rig: Rig, offsets: Sequence[float] | NDArray[np.fl
     """
     if not isinstance(pictures, ViewStack) or pictures.depth is None:
         raise InputError("pictures: expected a ViewStack with depth")
-    places = np.asarray(offsets, dtype=np.float64)
-    if places.shape != (pictures.views,) or not np.isfinite(places).all():
-        raise InputError(f"offsets: expected {pictures.views} numbers, one a picture, got {places.size}")
-    if not (pictures.depth > 0).all():
+    if not isinstance(rig, Rig):
+        raise InputError(f"rig: expected a Rig, got {type(rig).__name__}")
+    check_arguments(rig, None)
+    try:
+        places = np.array(offsets, np.float64)
+        with np.errstate(over="ignore"):  # beyond float32 is infinitely far
+            depths = np.array(pictures.depth, np.float32)
+    except (TypeError, ValueError):
+        raise InputError("pictures, offsets: expected depths and offsets that are numbers") from None
+    if places.shape != (pictures.views,) or not (np.abs(places) < FARTHEST).all():
+        raise InputError(f"offsets: expected {pictures.views} numbers, one a picture, got {offsets!r}")
+    if not (depths > 0).all():
         raise InputError("pictures: expected depths > 0, inf where there is nothing, found zero, negative or NaN")
     from .engines.cpu import dibr
 
     camera, shape = make_camera(rig, (pictures.width, pictures.height)), (rig.views, *pictures.color.shape[1:])
     check_memory(2 * int(np.prod([int(n) for n in shape])), describe(shape))
-    color = np.empty(shape, np.uint8)
-    depth = np.empty(color.shape[:3], np.float32)
-    references = Target(np.ascontiguousarray(pictures.color), np.asarray(pictures.depth, np.float32))
-    for k, offset in enumerate(rig.camera_offsets):
-        dibr.warp(references, places, camera, float(offset), Target(color[k : k + 1], depth[k : k + 1]))
-    return ViewStack(color, depth)
+    views = Target(np.empty(shape, np.uint8), np.empty(shape[:3], np.float32))
+    dibr.warp(Target(np.array(pictures.color, order="C"), depths), places, camera, rig.camera_offsets, views)
+    return ViewStack(views.color, views.depth)
 
 
 def observe(

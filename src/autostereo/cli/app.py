@@ -25,10 +25,11 @@ from .quilt import quilt
 from .render import render
 from .simulate import simulate
 from .views import views
+from .warp import warp
 from .weave import weave
 
 VERBS: tuple[Callable[..., None], ...] = (
-    render, quilt, views, weave, observe, pattern, displays, info, demo, bench, simulate
+    render, quilt, views, warp, weave, observe, pattern, displays, info, demo, bench, simulate
 )  # fmt: skip
 
 app = typer.Typer(

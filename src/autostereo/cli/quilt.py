@@ -47,6 +47,8 @@ def quilt(
     iso: common.Iso = None,
     step: common.Step = 1.0,
     volume: common.Rays = "shared",
+    views_per_pass: common.PerPass = None,
+    references: common.References = 2,
     quiet: common.Quiet = False,
 ) -> None:
     """Render a quilt: all views tiled into one picture.
@@ -63,7 +65,10 @@ def quilt(
 
     where = None if display is None else common.load_display(display)
     layout = choose_layout(where, grid, view_size, aspect)
-    options = Options(shading=shading, lighting=lighting, samples=samples, step=step, volume=volume)
+    options = Options(
+        shading=shading, lighting=lighting, samples=samples, step=step, volume=volume,
+        views_per_pass=views_per_pass, references=references,
+    )  # fmt: skip
     volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
     common.check_side(side, camera)
     rig = common.load_camera(camera)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..errors import DependencyError, InputError
 from . import common
 from .common import say
+
+if TYPE_CHECKING:
+    from ..display.rig import Rig
+    from ..frame import ViewStack
 
 ANIMATIONS = (".gif", ".webp", ".mp4")
 
@@ -98,7 +102,13 @@ def views(
     common.announce_compilation(engine, *kernels_for(scene, False, options))
     with common.working(f"rendering {rig.views} views"):
         stack = render_views(scene, rig, pixels, method=method, engine=engine, options=options)
-    with common.working("writing", None):
+    write_views(output, stack, rig)
+
+
+def write_views(output: Path, stack: ViewStack, rig: Rig) -> None:
+    """Write an animation, an array, or a folder with the cameras, by the output's name."""
+    suffix = output.suffix.lower()
+    with common.working("writing"):
         if suffix in ANIMATIONS:
             from ..encoders.video import save_animation
 
@@ -109,7 +119,7 @@ def views(
             with common.whole_folder(output, stale="view_*.png") as folder:
                 stack.save(folder)
                 rig.save(folder / "rig.json")
-    say(f"{output}  {rig.views} views of {pixels[0]}×{pixels[1]}")
+    say(f"{output}  {stack.views} views of {stack.width}×{stack.height}")
 
 
 def check_animation(path: Path, size: tuple[int, int]) -> None:

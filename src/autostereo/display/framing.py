@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -97,8 +97,7 @@ def frame_rig(scene: Any, display: Display, side: str = "front") -> Rig:
     reach = (steps + 1) / steps if display.continuous else 1.0
 
     # half the baseline, as a share of F: min(by_cone, by_comfort/δ), where δ = hz/D is |1 − F/d| at both ends
-    by_cone = math.tan(math.radians(display.cone_deg) / 2)
-    by_comfort = (1 - 1e-9) * display.comfort * steps / (2 * _focal_px(display))  # rounding stays inside the limit
+    by_cone, by_comfort = _limits(display)
 
     # inside at the near face, the tightest: hx/(D − hz) + reach·min(by_cone·hz/D, by_comfort) ≤ room·tan_x
     t, k = room * tan_x, reach * by_cone
@@ -122,6 +121,28 @@ def frame_rig(scene: Any, display: Display, side: str = "front") -> Rig:
         spacing="linear",
         aspect=display.aspect,
     )
+
+
+def frame_depths(depth: NDArray[np.float32], display: Display, fov_y: float) -> Rig:
+    """Choose a rig for a picture with depths (H, W), taken with `fov_y` degrees from (0, 0, 0) along −z.
+
+    Focal plane and baseline as in `frame_rig`, for depths from the first to the ninety-ninth per cent: depth cameras
+    have outliers.
+
+    Raises
+    ------
+    InputError
+        Nothing has a finite depth.
+    """
+    finite = depth[np.isfinite(depth)].astype(np.float64)
+    if not finite.size:
+        raise InputError("depth: expected some finite depths, found none")
+    near, far = np.percentile(finite, (1, 99)).tolist()
+    focal = 2 / (1 / near + 1 / far)
+    rig = Rig((0, 0, 0), (0, 0, -1), fov_y=fov_y, focal_distance=focal, views=display.views, aspect=display.aspect)
+    by_cone, by_comfort = _limits(display, rig)
+    delta = focal / near - 1
+    return replace(rig, baseline=2 * focal * (by_cone if by_cone * delta <= by_comfort else by_comfort / delta))
 
 
 def depth_budget(scene: Any, display: Display, rig: Rig | None = None) -> DepthBudget:
@@ -164,6 +185,13 @@ def _focal_px(display: Display, rig: Rig | None = None) -> float:
     fov_y = display.fov_y if rig is None else rig.fov_y
     aspect = display.aspect if rig is None or rig.aspect is None else rig.aspect
     return display.comfort_size[0] / 2 / (aspect * math.tan(math.radians(fov_y) / 2))
+
+
+def _limits(display: Display, rig: Rig | None = None) -> tuple[float, float]:
+    """What half the baseline, as a share of the focal distance, is limited by: the cone; comfort, times |1 − F/d|."""
+    steps = max(display.views - 1, 1)
+    by_comfort = (1 - 1e-9) * display.comfort * steps / (2 * _focal_px(display, rig))  # rounding stays inside the limit
+    return math.tan(math.radians(display.cone_deg) / 2), by_comfort
 
 
 def _bounds(scene: Any) -> NDArray[np.float64]:

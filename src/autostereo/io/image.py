@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -33,6 +33,11 @@ def read_image(path: PathLike, asked_by: PathLike | None = None) -> NDArray[np.u
 
 def decode_image(data: bytes, name: str) -> NDArray[np.uint8]:
     """Decode the bytes of a picture file, as `read_image`; `name` is what an error calls it."""
+    return decode(data, name, lambda image, _: _as_rgb(image))
+
+
+def decode(data: bytes, name: str, pixels: Callable[[Any, str], NDArray[Any]]) -> NDArray[Any]:
+    """Open the bytes of a picture file, and return what `pixels` makes of the PIL image and `name`."""
     from PIL import Image
 
     with _without_pillow_limit():
@@ -44,7 +49,9 @@ def decode_image(data: bytes, name: str) -> NDArray[np.uint8]:
         if width * height > MAX_PIXELS:
             raise FileError(f"{name}: a picture of {width}×{height} pixels is too large, the limit is {MAX_PIXELS}")
         try:
-            return _as_rgb(image)
+            return pixels(image, name)
+        except FileError:
+            raise
         except MemoryError:
             raise FileError(f"{name}: not enough memory for {width}×{height} pixels") from None
         except Exception as error:  # decoders raise OSError, SyntaxError, ValueError, struct.error, zlib.error …

@@ -27,7 +27,7 @@ def load_npy(path: PathLike, hints: Hints = NO_HINTS) -> list[Points | Volume]:
     (N, 3…10) is a point cloud with the columns that `load_table` describes, a structured array (N,) one with named
     columns; (nz, ny, nx) is a volume of unit spacing, (frames, nz, ny, nx) several.
     """
-    array = _read(path)
+    array = read_arrays(path)
     if array.dtype.names is not None:
         if array.ndim != 1 or not len(array):
             raise FileError(f"{path}: expected a structured array (N,), got {array.shape}")
@@ -42,7 +42,7 @@ def load_npz(path: PathLike, hints: Hints = NO_HINTS) -> list[Points | Volume]:
     colors or rgb (N, 3 or 4) and radii (N,) or a number. A file without such a key must hold one array, read as from
     .npy, or one with three axes: a volume.
     """
-    arrays = {name.lower(): array for name, array in _read(path).items()}
+    arrays = {name.lower(): array for name, array in read_arrays(path).items()}
     positions, normals, colors, radii = (
         next((arrays[name] for name in names if name in arrays), None)
         for names in (_POSITIONS, _NORMALS, _COLORS, _RADII)
@@ -74,8 +74,8 @@ def _object(array: NDArray, path: PathLike, hints: Hints) -> Points | Volume:
     )
 
 
-def _read(path: PathLike) -> Any:
-    """The array of a .npy file, or those of a .npz file by name."""
+def read_arrays(path: PathLike) -> Any:
+    """Read the array of a .npy file, or those of a .npz file by name."""
     data = read_bytes(path)
     if data[:6] != b"\x93NUMPY" and data[:2] != b"PK":
         raise FileError(f"{path}: is not a NumPy file")

@@ -28,9 +28,7 @@ def draw_views(engine: Engine, prepared: Any, draw: Draw, target: Target) -> Non
     from ..engines.cpu.dibr import warp
 
     references, offsets = draw_references(engine, prepared, draw)
-    for i, offset in enumerate(draw.offsets):
-        depth = None if target.depth is None else target.depth[i : i + 1]
-        warp(references, offsets, draw.camera, float(offset), Target(target.color[i : i + 1], depth))
+    warp(references, offsets, draw.camera, draw.offsets, target)
     target.covered, target.reused = references.covered, references.reused
 
 
@@ -40,8 +38,8 @@ def draw_panel(engine: Engine, prepared: Any, draw: Draw, target: Target) -> Non
 
     references, offsets = draw_references(engine, prepared, draw)
     one = Target(np.empty((1, *target.color.shape[:2], 4), np.uint8))
-    for i, offset in enumerate(draw.offsets):
-        warp(references, offsets, draw.camera, float(offset), one)
+    for i in range(len(draw.offsets)):
+        warp(references, offsets, draw.camera, draw.offsets[i : i + 1], one)
         engine.merge_view(one.color[0], i, draw, target.color)
     target.covered, target.reused = references.covered, references.reused
 

@@ -40,6 +40,11 @@ WORKS: dict[str, Work[PapersStudio]] = {
         papers_plane.rates_by_views,
         tuple(f"{views} views" for views in (2, 8, 16, 48, 96)),
     ),
+    "2020-fig15-dibr": Work(
+        "2020 Fig. 15: views of one panel's pixels in all, drawn or warped",
+        papers_plane.against_warping,
+        tuple(f"{views} views" for views in (8, 16, 48, 96)),
+    ),
     "2007b-points": Work("2007b Chart 2: points", papers_mesh.chart_points, tuple(papers_mesh.POINTS)),
     "2007b-triangles": Work("2007b Chart 3: triangles", papers_mesh.chart_triangles, tuple(papers_mesh.SUBDIVISIONS)),
     "2007b-immediate": Work("2007b Chart 4: immediate mode", papers_mesh.chart_immediate),

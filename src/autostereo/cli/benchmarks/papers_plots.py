@@ -11,7 +11,7 @@ from ...errors import DependencyError
 from ...image import write_atomic
 
 UNITS = {"fps": "frames per second", "%": "per cent", "ms": "milliseconds", "dB": "PSNR in dB", "a sample": "a sample"}
-LINES = "2020-fig15"  # by a number of views
+LINES = ("2020-fig15", "2020-fig15-dibr")  # by a number of views
 LOGARITHMIC = ("fps", "ms")
 
 
@@ -48,7 +48,7 @@ def plot(folder: Path, results: Sequence[dict[str, Any]]) -> list[Path]:
     for (work, unit), figures in charts.items():
         chart = Figure(figsize=(9, 4.5), layout="constrained")
         axes = chart.add_subplot()
-        (_lines if work == LINES else _bars)(axes, figures)
+        (_lines if work in LINES else _bars)(axes, figures)
         axes.set(title=work, ylabel=UNITS[unit], yscale="log" if unit in LOGARITHMIC else "linear")
         axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
         path = folder / f"{work}-{'percent' if unit == '%' else unit.replace(' ', '-')}.png"

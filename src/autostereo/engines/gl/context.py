@@ -164,6 +164,7 @@ class Device:
     def without_reading(self) -> Iterator[None]:
         """Leave finished pictures on the device meanwhile, as for a screen: arrays to draw into stay as they are.
 
+        Views with depths are read nevertheless: method dibr works on them.
         Frames in a row then overlap, and what is timed is drawing; `finish` waits for it.
         """
         before, self.reads = self.reads, False

@@ -112,7 +112,8 @@ def draw_views(job: Job, stages: list[Stage], target: Target) -> None:
     """Draw a stack of views, as many at a time as an atlas may hold."""
     for part in atlases(job):
         _draw_samples(part, stages, target.depth)
-        for tile in range(part.count if job.device.reads else 0):
+        wanted = job.device.reads or target.depth is not None  # what has depths is worked on: dibr
+        for tile in range(part.count if wanted else 0):
             part.atlas.read_color(tile, target.color[part.first + tile])
 
 
