@@ -40,7 +40,7 @@ def fetch_pixels(n, base, slab, channel, last, values, pixels, index, pairs):
 
 @lean
 def blend_pixels(blocks, averaged, camera, slices, first, last, shared, pixels, index, pairs):
-    """Add slabs first … last to the sub-pixels of a row, in blocks of 64 for each channel, each at its own place."""
+    """Add slabs first … last to the sub-pixels of a row, in blocks of RAYS for each channel, each at its own place."""
     n = np.uint64(RAYS)
     stride = PIXEL_ROWS * ROW
     bound = np.float32(shared.length * shared.phases - 2)
@@ -114,7 +114,7 @@ def hide_behind_panel(width, offsets, camera, cut, slices, k, last, planes, pixe
 
 @inlined
 def keep_between(x, low, high, near, far, camera, cut, alive):
-    """Note that pixels x … x + 64 are not yet opaque for any offset between two: the offset enters linearly."""
+    """Note that pixels x … x + RAYS are not yet opaque for any offset between two: the offset enters linearly."""
     left, right = (x - 1 - camera.centre_x) / camera.fx, (x + RAYS + 1 - camera.centre_x) / camera.fx
     near_part, far_part = 1.0 - near / camera.focal, 1.0 - far / camera.focal
     a, b = min(low * near_part, high * near_part), max(low * near_part, high * near_part)

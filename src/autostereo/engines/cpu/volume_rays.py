@@ -1,6 +1,6 @@
 """Volumes along rays of their own: one view, or sub-pixels one by one (`volume="exact"`, n-pass, every isosurface).
 
-Rays are handled in blocks of 64, whose state lies in rows a fixed distance apart, so that every loop is SIMD (see
+Rays are handled in blocks of RAYS, whose state lies in rows a fixed distance apart, so that every loop is SIMD (see
 scalars). A slab is the stretch of a ray between two slices; its scalars at both ends are looked up in the table of
 pre-integrated slabs (Engel, Kraus and Ertl 2001).
 """
