@@ -23,7 +23,7 @@ from .scene_arrays import light_array
 from .threads import run_rows
 from .volume_modes import LEVELS
 from .volume_panel import PIXEL_ROWS, draw_panel_rays, draw_panel_rows
-from .volume_plan import SLIDE, can_share, share_slices, shared_reach
+from .volume_plan import SLIDE, can_share, plan_bundles, share_slices, shared_reach
 from .volume_rays import BLOCK_ROWS, RAYS, ROW
 from .volume_sample import CHUNK, LIST, LIST_ROWS, SLABS, Cut, Planes
 from .volume_setup import (
@@ -250,6 +250,7 @@ def _draw_shared(
     samples = samples_of(prepared, index, camera, cut)
     pixel = slices.first / camera.fx * float(np.abs(cut.from_eye[:, 0]).max())  # of the nearest one, in voxels
     fine = int(np.clip(np.ceil(FINE_VIEWS[2] * pixel), FINE_VIEWS[0], FINE_VIEWS[1]))
+    groups = plan_bundles(camera, slices, offsets, fine, pixel)
     key = (
         "volume shared",
         fine,
@@ -264,7 +265,7 @@ def _draw_shared(
         key,
         lambda: (
             new_planes(samples, slices),
-            new_shared(camera, slices, offsets, fine, fine),
+            tuple(new_shared(camera, slices, offsets, fine, fine) for _ in range(2)),
             np.zeros(BLOCK_ROWS * ROW, np.float32),
             np.zeros(ROW, np.int32),
             np.zeros(len(offsets) * SLAB_ROWS * LINE, np.float32),
@@ -272,10 +273,9 @@ def _draw_shared(
     )
 
     def task(first: int, end: int) -> None:
-        with pool as (planes, shared, rays, packed, line):
-            draw_shared_rows(
-                (first, end), cut, numbers, slices, ways, offsets, planes, shared, rays, packed, line, color
-            )
+        with pool as (planes, slabs, rays, packed, line):
+            args = (ways, offsets, groups, planes, slabs, rays, packed, line, color)
+            draw_shared_rows((first, end), cut, numbers, slices, *args)
 
     run_rows(draw.camera.height, task)
 

@@ -16,13 +16,12 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined, lean
-from .scalars import exp2_fast, log2_fast
-from .simd import LANES, fused, load, mask_word, splat, store
+from .scalars import exp2_fast
+from .simd import LANES, load, mask_word
 from .volume_rays import (
     BACK,
     END,
     FRONT,
-    HIDDEN,
     LENGTH,
     ONE,
     OPTICAL,
@@ -157,106 +156,3 @@ def classify_slabs(cut, camera, row, slices, first, last, table, material, light
                     rays[base + FRONT + i] = rays[base + BACK + i]
                 note_shown(base, shared.shown, k - first, g, rays)
                 fresh = True
-
-
-@inlined
-def add_positions(near, beside, part, values, sums):
-    """Add eight positions of a slab, between two neighbours, to the sums (red, green, blue, transmittance)."""
-    through = sums[3]
-    right = through * part
-    left = through - right
-    red = fused(left, load(values, near + RED), fused(right, load(values, beside + RED), sums[0]))
-    green = fused(left, load(values, near + GREEN), fused(right, load(values, beside + GREEN), sums[1]))
-    blue = fused(left, load(values, near + BLUE), fused(right, load(values, beside + BLUE), sums[2]))
-    return red, green, blue, fused(left, load(values, near + LESS), fused(right, load(values, beside + LESS), through))
-
-
-@inlined
-def load_sums(i, line):
-    """Sums of eight pixels."""
-    return load(line, i + RED), load(line, i + GREEN), load(line, i + BLUE), load(line, i + ALPHA)
-
-
-@inlined
-def store_sums(i, sums, line):
-    """Keep sums of eight pixels."""
-    store(line, i + RED, sums[0])
-    store(line, i + GREEN, sums[1])
-    store(line, i + BLUE, sums[2])
-    store(line, i + ALPHA, sums[3])
-
-
-@inlined
-def place_slabs(offset, camera, slices, first, last, shared):
-    """Where pixel 0 of a view lies in each slab."""
-    phases = shared.phases
-    for k in range(first, last):
-        at = (-offset * shift_of(camera, slices, k) - shared.begin) * shared.fine
-        m = np.int64(np.floor(at))
-        q, phase, slab = m // phases, m % phases, (k - first) * phases
-        beside = (slab + phase + 1) * SLAB_ROWS * LINE if phase + 1 < phases else slab * SLAB_ROWS * LINE + 1
-        shared.places[k - first, POSITION] = q
-        shared.places[k - first, NEAR] = (slab + phase) * SLAB_ROWS * LINE + q
-        shared.places[k - first, BESIDE] = beside + q
-        shared.parts[k - first] = np.float32(at - m)
-
-
-@lean
-def blend_view(offset, width, camera, slices, first, last, shared, t, line):
-    """Add slabs first … last to the pixels of one view, whose sums are rows of `line` from place t on.
-
-    Technique: sums of 24 pixels stay in registers while they go through all slabs.
-    """
-    place_slabs(offset, camera, slices, first, last, shared)
-    values, places, parts, shown = shared.values, shared.places, shared.parts, shared.shown
-    one, span = np.uint64(LANES), np.uint64(SPAN)
-    two, three = one + one, one + one + one
-    for x in range(0, width, 3 * LANES):
-        i = np.uint64(t + x)
-        a, b, c = load_sums(i, line), load_sums(i + one, line), load_sums(i + two, line)
-        if mask_word((a[3] >= HIDDEN) | (b[3] >= HIDDEN) | (c[3] >= HIDDEN)) == 0:
-            continue
-        for k in range(np.uint64(last - first)):
-            position = np.uint64(places[k, POSITION] + x)
-            if shown[k, position // span] | shown[k, (position + three) // span] == 0:
-                continue
-            near, beside = np.uint64(places[k, NEAR] + x), np.uint64(places[k, BESIDE] + x)
-            part = splat(parts[k])
-            a = add_positions(near, beside, part, values, a)
-            b = add_positions(near + one, beside + one, part, values, b)
-            c = add_positions(near + two, beside + two, part, values, c)
-        store_sums(i, a, line)
-        store_sums(i + one, b, line)
-        store_sums(i + two, c, line)
-
-
-@inlined
-def even_out(width, offset, middle, camera, row, t, line):
-    """Turn sums over slabs of the centre camera's lengths into those of a view's own.
-
-    The centre camera's rays are those through the same points at depth `middle`.
-    """
-    inverse, half = np.float32(1.0 / camera.fx), np.float32(camera.centre_x - 0.5)
-    turn, slope = np.float32(offset / camera.focal), np.float32(row[0] * row[0] + 1.0)
-    moved = np.float32(offset / middle)
-    for i in range(np.uint64(width)):
-        own = (np.float32(i) - half) * inverse - turn
-        centre = own + moved
-        through = line[t + ALPHA + i]
-        ratio = np.sqrt((slope + own * own) / (slope + centre * centre))
-        even = exp2_fast(ratio * log2_fast(max(through, np.float32(1e-30))))
-        scale = (ONE - even) / max(ONE - through, np.float32(1e-6))
-        line[t + RED + i] *= scale
-        line[t + GREEN + i] *= scale
-        line[t + BLUE + i] *= scale
-        line[t + ALPHA + i] = even
-
-
-@inlined
-def clear_line(n, t, line):
-    """Sums of a view's pixels before anything is seen."""
-    for i in range(n):
-        line[t + RED + i] = ZERO
-        line[t + GREEN + i] = ZERO
-        line[t + BLUE + i] = ZERO
-        line[t + ALPHA + i] = ONE

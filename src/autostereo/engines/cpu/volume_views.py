@@ -8,6 +8,7 @@ import numpy as np
 
 from .jit import inlined, kernel, lean
 from .simd import LANES, greater, lesser, load, mask_word, splat, store, to_float, to_int
+from .volume_blend import blend_group, clear_line, even_out, load_sums
 from .volume_modes import NONE, march_iso, march_mip, resolve_iso, resolve_mip
 from .volume_rays import (
     DONE,
@@ -33,7 +34,7 @@ from .volume_rays import (
     ray_stretch,
 )
 from .volume_sample import SLABS, TINY, hide_runs, keep_alive, mark_runs
-from .volume_shared import ALPHA, LINE, SLAB_ROWS, blend_view, classify_slabs, clear_line, even_out, load_sums
+from .volume_shared import ALPHA, LINE, SLAB_ROWS, classify_slabs
 
 COMPOSITE, MIP, ISO = 0, 1, 2
 PIXELS = RAYS // 3  # of a block of sub-pixels that are averaged
@@ -253,8 +254,13 @@ def hide_behind_views(views, width, offsets, camera, cut, slices, k, last, plane
 
 
 @kernel
-def draw_shared_rows(rows, cut, camera, slices, ways, offsets, planes, shared, rays, packed, line, color):
-    """Draw rows (first, end) of every view from slabs that they share, over color (V, H, W, 4)."""
+def draw_shared_rows(rows, cut, camera, slices, ways, offsets, groups, planes, slabs, rays, packed, line, color):
+    """Draw rows (first, end) of every view from slabs that they share, over color (V, H, W, 4).
+
+    groups = (slabs in a bundle, where groups of views begin); slabs = (shared, bundles).
+    """
+    shared, bundles = slabs
+    size, begins = groups
     views, height, width, _ = color.shape
     words = color.reshape(-1).view(np.int32)
     for r in range(rows[0], rows[1]):
@@ -270,8 +276,9 @@ def draw_shared_rows(rows, cut, camera, slices, ways, offsets, planes, shared, r
                 hide_behind_views(views, width, offsets, camera, cut, slices, k, last, planes, line)
             args = (ways.table, ways.material, ways.light, planes, shared, rays, packed)
             classify_slabs(cut, camera, row, slices, k, last, *args)
-            for v in range(views):
-                blend_view(offsets[v], width, camera, slices, k, last, shared, v * SLAB_ROWS * LINE, line)
+            for g in range(len(begins) - 1):
+                near, place = offsets[begins[g] : begins[g + 1]], begins[g] * SLAB_ROWS * LINE
+                blend_group(near, width, camera, slices, k, last, size, shared, bundles, place, line)
         for v in range(views):
             t, middle = np.uint64(v * SLAB_ROWS * LINE), slices.first + 0.5 * slices.slabs * slices.distance
             even_out(width, offsets[v], middle, camera, row, t, line)
