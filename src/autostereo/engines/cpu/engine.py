@@ -122,7 +122,8 @@ class CpuEngine:
             target.covered, target.reused = target.covered + stage.covered, target.reused + stage.reused
         else:
             background = np.array([background_word(prepared.scene)]).view(np.uint8)
-            target.color[...] = background[: target.color.shape[-1]]
+            line = np.tile(background[: target.color.shape[-1]], (target.color.shape[-2], 1))
+            target.color[...] = line  # whole rows: numpy copies four bytes at a time much slower
             if depth is not None:
                 depth[...] = np.inf
         draw_volumes = draw_volume_panel if panel else draw_volume_views

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scene.scene import Scene
+from ...scene.transfer import TransferFunction
 from ...scene.volume import Volume
 from ..engine import Camera, Draw
 from ..options import Options
@@ -30,6 +31,7 @@ from .volume_setup import (
     BLOCK,
     TABLE,
     Field,
+    make_plain,
     make_table,
     prepare_field,
     shown_blocks,
@@ -39,6 +41,7 @@ from .volume_views import ISO, MIP, Ways, draw_rows, draw_shared_rows
 
 MODES = ("composite", "mip", "iso")  # in the order of volume_views
 RUN_STEP = 0.5  # voxels, a sixteenth of a run
+SHARED_BLOCKS = 3  # of rays: sampled ones, what lies between, and those of it that are sampled, too
 FINE_VIEWS = (1, 8, 3)  # positions of a shared slab: least and most per pixel, and per voxel between them
 
 
@@ -83,6 +86,12 @@ def gradient_turn(camera: Camera, volume: Volume) -> NDArray[np.float32]:
     return (turn / np.abs(turn).max()).astype(np.float32)
 
 
+def tables(transfer: TransferFunction, low: float, high: float, length: float) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Slabs of a length (make_table), and between which of them the transfer function is plain (make_plain)."""
+    table = make_table(transfer, low, high, length)
+    return table, make_plain(table)
+
+
 def make_cut(prepared: PreparedVolumes, index: int, draw: Draw, slices: Slices, memory: Memory) -> tuple[Cut, Ways]:
     """How volume `index` is cut, lit and classified in this frame."""
     f, camera = prepared.fields[index], draw.camera
@@ -95,10 +104,10 @@ def make_cut(prepared: PreparedVolumes, index: int, draw: Draw, slices: Slices, 
     reach = int(np.ceil((8 * step * along + 1 + slices.distance * np.abs(index_from_eye[:3, 2]).max()) / (1 << BLOCK)))
     shown = memory.remember(("shown", index), (reach, volume), lambda: shown_blocks(f, reach))
     low, high = table_range(volume)
-    table = memory.remember(
+    table, plain = memory.remember(
         ("table", index),
         (volume, slices.distance),
-        lambda: make_table(volume.transfer, low, high, slices.distance),
+        lambda: tables(volume.transfer, low, high, slices.distance),
     )
     low, high = (low - f.first_value) / f.value_step, (high - f.first_value) / f.value_step
     lights, m = light_array(prepared.scene, camera), volume.material
@@ -140,6 +149,7 @@ def make_cut(prepared: PreparedVolumes, index: int, draw: Draw, slices: Slices, 
     return cut, Ways(
         mode,
         table,
+        plain,
         (m.ambient, m.diffuse, m.specular),
         light,
         np.ascontiguousarray(colors),
@@ -237,7 +247,8 @@ def new_shared(camera: Camera, slices: Slices, offsets: NDArray[np.float64], fin
     values = np.zeros(SLABS * phases * SLAB_ROWS * LINE, np.float32)
     shown = np.zeros((SLABS, count // SPAN + 1), np.uint8)  # one more: pixels are drawn in whole SIMD steps
     places, parts = np.zeros((SLABS, 3), np.int64), np.zeros(SLABS, np.float32)
-    return Shared(begin, fine, phases, count, values, shown, places, parts)
+    front, back, picked = (np.zeros(ROW, np.int32) for _ in range(3))
+    return Shared(begin, fine, phases, count, values, shown, places, parts, front, back, picked)
 
 
 def _draw_shared(
@@ -266,7 +277,7 @@ def _draw_shared(
         lambda: (
             new_planes(samples, slices),
             tuple(new_shared(camera, slices, offsets, fine, fine) for _ in range(2)),
-            np.zeros(BLOCK_ROWS * ROW, np.float32),
+            np.zeros(SHARED_BLOCKS * BLOCK_ROWS * ROW, np.float32),
             np.zeros(ROW, np.int32),
             np.zeros(len(offsets) * SLAB_ROWS * LINE, np.float32),
         ),
@@ -341,7 +352,7 @@ def _panel_pool(
         scratch = (
             np.zeros(3 * width, np.float32),
             np.zeros(width, np.float64),
-            np.zeros(BLOCK_ROWS * ROW, np.float32),
+            np.zeros(SHARED_BLOCKS * BLOCK_ROWS * ROW, np.float32),
             np.zeros(ROW, np.int32),
             np.zeros(0 if plan is None else PIXEL_ROWS * ROW * 3 * -(-width // RAYS), np.float32),
         )

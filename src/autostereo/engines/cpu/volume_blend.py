@@ -2,7 +2,7 @@
 
 Neighbouring views shift neighbouring slabs nearly alike. So a few slabs are blended once for a group of views, as its
 middle view sees them, into one **bundle**, and the group's views are sums of bundles: with V views in G groups and b
-slabs in a bundle, a slab is blended G + V/b times instead of V. In a bundle no slab is off by more than volume_plan.SLIP.
+slabs in a bundle, a slab is blended G + V/b times instead of V. None of a bundle is off by more than volume_plan.SLIP.
 """
 
 from __future__ import annotations

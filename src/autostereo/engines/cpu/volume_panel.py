@@ -152,8 +152,7 @@ def draw_panel_rows(rows, cut, camera, slices, ways, panel, averaged, planes, sh
             last = min(k + SLABS, slices.slabs)
             if k > 0:
                 hide_behind_panel(width, offsets, camera, cut, slices, k, last, planes, pixels)
-            args = (ways.table, ways.material, ways.light, planes, shared, rays, index)
-            classify_slabs(cut, camera, row, slices, k, last, *args)
+            classify_slabs(cut, camera, row, slices, k, last, ways, planes, shared, rays, index)
             blend_pixels(blocks, averaged, camera, slices, k, last, shared, pixels, index, planes.place)
         for c in range(3):
             for x in range(width):

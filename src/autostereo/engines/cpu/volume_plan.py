@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from ..engine import Camera
 from ..volumes import MAX_PLANES, Slices
-from .volume_rays import RAYS
-from .volume_shared import MAX_LENGTH
+from .volume_shared import CELLS, MAX_LENGTH
 
 STEEPEST = 1.0  # greatest offset of a camera over the nearest depth, up to which views may share slabs
 BUNDLES = (2, 4, 8)  # slabs blended once for a group of views; whole parts of SLABS
@@ -35,7 +34,7 @@ def shared_reach(
     shifts = np.outer(offsets, camera.fx / camera.focal - camera.fx / ends)
     begin = float(np.floor(-shifts.max())) - 2.0
     positions = (camera.width - float(shifts.min()) + 2.0 - begin) * fine
-    return begin, -(-int(np.ceil(positions / phases) + 2) // RAYS) * RAYS
+    return begin, -(-int(np.ceil(positions / phases) + 2) // (2 * CELLS)) * (2 * CELLS)
 
 
 def can_share(camera: Camera, slices: Slices, offsets: NDArray[np.float64]) -> bool:

@@ -19,6 +19,7 @@ from .jit import inlined, kernel
 from .threads import run_rows
 
 BLOCK = 2  # log2 of the edge of a block, in voxels
+PLAIN = 1 / 512  # of full colour or opacity: what is plain enough between two scalars
 TABLE = 256  # scalars of the pre-integration table
 SOUNDINGS = 65_521  # voxels whose gradients are measured, to know how steep they are
 STEEP = 99.9  # percentile of those that differ from zero: steeper gradients keep their direction only
@@ -201,6 +202,24 @@ def make_table(transfer: TransferFunction, low: float, high: float, length: floa
     optical = (rgba[:, 3].astype(np.float64) * length / np.log(2.0)).astype(np.float32)
     c = np.floor(np.clip(rgba[:, :3], 0, 1) * 1023.0 + 0.5).astype(np.int64)
     return optical.view(np.int32).astype(np.int64) | (c[:, 0] | (c[:, 1] << 10) | (c[:, 2] << 20)) << 32
+
+
+def make_plain(table: NDArray[np.int64]) -> NDArray[np.uint8]:
+    """Return where [one, other] a slab's colour and opacity hardly depart from a straight line between two scalars.
+
+    (65536,) uint8. Between the ends of an interval a curve departs from its chord by at most a quarter of the
+    interval's length times all changes of slope within.
+    """
+    same = table.reshape(TABLE, TABLE).diagonal()
+    opacity = 1.0 - np.exp2(-(same & 0xFFFFFFFF).astype(np.uint32).view(np.float32).astype(np.float64))
+    channels = [opacity * ((same >> shift & 1023) / 1023.0) for shift in (32, 42, 52)]
+    curve = np.pad(np.array([opacity, *channels]), ((0, 0), (1, 1)), mode="edge")
+    bends = np.cumsum(np.abs(np.diff(curve, 2, axis=1)), axis=1)
+    before = np.pad(bends, ((0, 0), (1, 0)))[:, :-1]
+    rows = np.arange(TABLE)
+    low, high = np.minimum.outer(rows, rows), np.maximum.outer(rows, rows)
+    departs = 0.25 * (high - low + 1) * (bends[:, high] - before[:, low]).max(axis=0)
+    return (departs <= PLAIN).astype(np.uint8).reshape(-1)
 
 
 def shown_blocks(field: Field, reach: int) -> NDArray[np.uint8]:

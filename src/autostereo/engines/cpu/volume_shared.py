@@ -17,16 +17,33 @@ import numpy as np
 
 from .jit import inlined, lean
 from .scalars import exp2_fast
-from .simd import LANES, load, mask_word
+from .simd import (
+    LANES,
+    append,
+    first_fours,
+    high_halves,
+    iota,
+    last_fours,
+    load,
+    low_halves,
+    mask_word,
+    splat,
+    store,
+)
 from .volume_rays import (
     BACK,
+    BLOCK_ROWS,
     END,
+    ENTER,
     FRONT,
+    HALF_WAY,
+    LEAVE,
     LENGTH,
     ONE,
     OPTICAL,
     ORIGIN,
     RAYS,
+    ROW,
     SHARE,
     TURN,
     ZERO,
@@ -51,6 +68,8 @@ RED, GREEN, BLUE, ALPHA = (np.uint64(k * LINE) for k in range(4))
 LESS = ALPHA  # of slabs: opacity, negative, so that one fused operation takes it away
 SLAB_ROWS = 4
 POSITION, NEAR, BESIDE = 0, 1, 2
+CELLS = 128  # pairs of positions that are handled together: one sampled, one between that and the next
+BEND, THREE = np.float32(0.016), np.float32(3.0)  # 16 times how far a value may depart from what it is interpolated to
 SPAN = 32  # positions of a phase of which it is known whether something is seen
 
 
@@ -60,7 +79,8 @@ class Shared(NamedTuple):
     begin: x of position 0; fine, phases: see above; length: positions of a phase, in whole blocks; values
     (SLABS · phases · 4 · LINE,) float32: colour times opacity, and LESS; shown (SLABS, length / SPAN) uint8: in
     which spans something is seen; the others are zero; places (SLABS, 3) int64, parts (SLABS,) float32: of pixel 0 of a
-    view, its position, where its left and right neighbours are kept, and how far it is from the left one to the right.
+    view, its position, where its left and right neighbours are kept, and how far it is from the left one to the right;
+    front, back, picked (ROW,) int32: scratch for what lies between sampled positions.
     """
 
     begin: float
@@ -71,6 +91,9 @@ class Shared(NamedTuple):
     shown: np.ndarray
     places: np.ndarray
     parts: np.ndarray
+    front: np.ndarray
+    back: np.ndarray
+    picked: np.ndarray
 
 
 @inlined
@@ -94,65 +117,239 @@ def start_positions(n, base, first, step, camera, row, far, rays):
         rays[base + END + i] = np.float32(far)
 
 
+@lean
+def classify_block(n, base, cut, row, depth, distance, fresh, look, planes, rays, packed):
+    """Classify and light a slab on a block of rays, into R, G, B and SHARE; fresh: FRONT is known already."""
+    table, material, light = look
+    after = depth + distance
+    if not fresh:
+        sample_volume(n, base, depth, cut, row, planes, FRONT, rays)
+    sample_volume(n, base, after, cut, row, planes, BACK, rays)
+    share_of_slab(n, base, depth, distance, rays)
+    trim_ends(n, base, cut, row, depth, distance, rays)
+    classify(n, base, table, planes.place, rays, packed)
+    for i in range(n):
+        optical = rays[base + OPTICAL + i] * rays[base + SHARE + i] * rays[base + LENGTH + i]
+        rays[base + SHARE + i] = ONE - exp2_fast(-optical)
+        rays[base + T + i] = ONE
+        rays[base + R + i] = ZERO
+        rays[base + G + i] = ZERO
+        rays[base + B + i] = ZERO
+    if light_slab(n, base, 0.5 * (depth + after), cut, row, False, planes, rays):
+        blend(n, base, material, light, rays, packed)
+
+
 @inlined
-def note_shown(base, shown, slab, group, rays):
-    """Note in which spans of a group of positions a slab is seen: SHARE is its opacity."""
-    for part in range(RAYS // SPAN):
-        first, seen = base + SHARE + np.uint64(part * SPAN), np.int32(0)
-        for i in range(np.uint64(0), np.uint64(SPAN), np.uint64(LANES)):
-            seen |= mask_word(load(rays, first + i) > ZERO)
-        if seen != 0:
-            shown[slab, group * (RAYS // SPAN) + part] = np.uint8(1)
+def look_up_plain(n, scalar, plain, numbers, found, rays):
+    """Whether the transfer function is plain from each ray's scalar to the next one's."""
+    for i in range(n + np.uint64(1)):
+        numbers[i] = np.int32(rays[scalar + i] + HALF_WAY)
+    for i in range(n):
+        found[i] = np.int32(plain[np.uint64((numbers[i] << np.int32(8)) + numbers[i + np.uint64(1)])])
+
+
+@inlined
+def smooth_between(i, row, rays):
+    """Middle of eight neighbouring values and the next ones; where it may be far from what lies between.
+
+    Four values in a row tell how far a cubic through them departs from a straight line, and whether they jump.
+    """
+    a, b = load(rays, row + i - np.uint64(1)), load(rays, row + i)
+    c, d = load(rays, row + i + np.uint64(1)), load(rays, row + i + np.uint64(2))
+    bend, jump = (b + c) - (a + d), (c - b) * splat(THREE) - (d - a)
+    middle = (b + c) * splat(HALF_WAY)
+    least, most = splat(-BEND), splat(BEND)
+    return middle, (bend < least) | (bend > most) | (jump < least) | (jump > most)
+
+
+@inlined
+def extend(row, rays):
+    """Give a row of values one more before the first."""
+    rays[row - np.uint64(1)] = rays[row] + rays[row] - rays[row + np.uint64(1)]
 
 
 @lean
-def classify_slabs(cut, camera, row, slices, first, last, table, material, light, planes, shared, rays, packed):
-    """Fill shared.values with slabs first … last."""
-    far = slices.first + slices.slabs * slices.distance
-    n = np.uint64(RAYS)
-    groups = shared.length // RAYS
-    base = np.uint64(0)
-    material = (np.float32(material[0]), np.float32(material[1]), np.float32(material[2]))
+def fill_between(n, front, back, picked, between, rays):
+    """Interpolate n positions between rays of block 0 into a block `between`; pick those that must be sampled.
+
+    front, back: where the transfer function is plain. Returns how many positions are picked.
+    """
+    extend(R, rays)
+    extend(G, rays)
+    extend(B, rays)
+    extend(SHARE, rays)
+    m = np.uint64(0)
+    for i in range(np.uint64(0), n, np.uint64(LANES)):
+        red, a = smooth_between(i, R, rays)
+        green, b = smooth_between(i, G, rays)
+        blue, c = smooth_between(i, B, rays)
+        share, d = smooth_between(i, SHARE, rays)
+        store(rays, between + R + i, red)
+        store(rays, between + G + i, green)
+        store(rays, between + B + i, blue)
+        store(rays, between + SHARE + i, share)
+        curved = (load(front, i) & load(back, i)) < splat(np.int32(1))
+        m = append(picked, m, iota() + np.int32(i), a | b | c | d | curved)
+    return m
+
+
+@lean
+def sample_picked(m, picked, cut, row, depth, distance, look, planes, between, spare, rays, packed):
+    """Classify picked positions of block `between` by themselves, with block `spare` as scratch."""
+    whole = (m + np.uint64(LANES - 1)) & ~np.uint64(LANES - 1)
+    for j in range(m, whole):
+        picked[j] = picked[m - np.uint64(1)]
+    for j in range(whole):
+        i = between + np.uint64(picked[j])
+        rays[spare + ORIGIN + j] = ZERO
+        rays[spare + TURN + j] = rays[TURN + i]
+        rays[spare + LENGTH + j] = rays[LENGTH + i]
+        rays[spare + ENTER + j] = rays[ENTER + i]
+        rays[spare + LEAVE + j] = rays[LEAVE + i]
+    classify_block(whole, spare, cut, row, depth, distance, False, look, planes, rays, packed)
+    for j in range(m):
+        i = between + np.uint64(picked[j])
+        rays[R + i] = rays[spare + R + j]
+        rays[G + i] = rays[spare + G + j]
+        rays[B + i] = rays[spare + B + j]
+        rays[SHARE + i] = rays[spare + SHARE + j]
+
+
+@inlined
+def keep_block(n, base, place, values, rays):
+    """Keep a classified slab."""
+    for i in range(n):
+        values[place + RED + i] = rays[base + R + i]
+        values[place + GREEN + i] = rays[base + G + i]
+        values[place + BLUE + i] = rays[base + B + i]
+        values[place + LESS + i] = -rays[base + SHARE + i]
+
+
+@inlined
+def keep_row_of_both(n, row, between, sign, place, values, rays):
+    """Keep a row of values and of those between them, in turn."""
+    for i in range(np.uint64(0), n, np.uint64(LANES)):
+        a, b = load(rays, row + i) * sign, load(rays, between + row + i) * sign
+        low, high = low_halves(a, b), high_halves(a, b)
+        to = place + i + i
+        store(values, to, first_fours(low, high))
+        store(values, to + np.uint64(LANES), last_fours(low, high))
+
+
+@inlined
+def clear_block(n, place, values):
+    """A slab in which nothing is seen."""
+    for c in range(4):
+        clear = place + np.uint64(c * LINE)
+        for i in range(n):
+            values[clear + i] = ZERO
+
+
+@inlined
+def note_shown(shown, k, place, positions, values):
+    """Note in which spans of `positions` positions from `place` on slab k is seen."""
+    for part in range(positions // SPAN):
+        first, seen = place + LESS + np.uint64(part * SPAN), np.int32(0)
+        for i in range(np.uint64(0), np.uint64(SPAN), np.uint64(LANES)):
+            seen |= mask_word(load(values, first + i) < ZERO)
+        if seen != 0:
+            shown[k, (first - LESS) % np.uint64(SLAB_ROWS * LINE) // np.uint64(SPAN)] = np.uint8(1)
+
+
+@lean
+def classify_cells(cut, camera, row, slices, first, last, look, plain, planes, shared, rays, packed):
+    """classify_slabs for one or two positions a pixel: every second one is sampled, what lies between where needed."""
+    n, more = np.uint64(CELLS), np.uint64(CELLS + LANES)
+    between, spare, base = np.uint64(BLOCK_ROWS * ROW), np.uint64(2 * BLOCK_ROWS * ROW), np.uint64(0)
+    front, back, picked = shared.front, shared.back, shared.picked
+    distance, one = slices.distance, splat(ONE)
+    far, wide = slices.first + slices.slabs * distance, 2.0 / shared.fine
+    groups = shared.length * shared.phases // (2 * CELLS)
     for g in range(groups):
-        for k in range(last - first):
-            for part in range(g * (RAYS // SPAN), (g + 1) * (RAYS // SPAN)):
-                shared.shown[k, part] = np.uint8(0)
+        x = shared.begin + g * CELLS * wide
+        start_positions(more, base, x, wide, camera, row, far, rays)
+        start_positions(n, between, x + 0.5 * wide, wide, camera, row, far, rays)
+        ray_stretch(more, base, cut, row, slices.first, rays)
+        ray_stretch(n, between, cut, row, slices.first, rays)
+        bounds, fresh = block_bounds(more, base, rays), False
+        for k in range(first, last):
+            depth = slices.first + k * distance
+            slab = (k - first) * shared.phases
+            place = np.uint64(slab * SLAB_ROWS * LINE + g * CELLS * 2 // shared.phases)
+            beside = place + np.uint64(SLAB_ROWS * LINE)
+            if not (
+                seen(bounds, depth, cut, planes.marks, k) or seen(bounds, depth + distance, cut, planes.marks, k + 1)
+            ):
+                fresh = False
+                if shared.phases == 1:
+                    clear_block(n + n, place, shared.values)
+                else:
+                    clear_block(n, place, shared.values)
+                    clear_block(n, beside, shared.values)
+                continue
+            classify_block(more, base, cut, row, depth, distance, fresh, look, planes, rays, packed)
+            if fresh:
+                for i in range(n):
+                    front[i] = back[i]
+            else:
+                look_up_plain(n, FRONT, plain, packed, front, rays)
+            look_up_plain(n, BACK, plain, packed, back, rays)
+            m = fill_between(n, front, back, picked, between, rays)
+            if m > np.uint64(0):
+                sample_picked(m, picked, cut, row, depth, distance, look, planes, between, spare, rays, packed)
+            if shared.phases == 1:
+                keep_row_of_both(n, R, between, one, place + RED, shared.values, rays)
+                keep_row_of_both(n, G, between, one, place + GREEN, shared.values, rays)
+                keep_row_of_both(n, B, between, one, place + BLUE, shared.values, rays)
+                keep_row_of_both(n, SHARE, between, splat(-ONE), place + LESS, shared.values, rays)
+                note_shown(shared.shown, k - first, place, 2 * CELLS, shared.values)
+            else:
+                keep_block(n, base, place, shared.values, rays)
+                keep_block(n, between, beside, shared.values, rays)
+                note_shown(shared.shown, k - first, place, CELLS, shared.values)
+                note_shown(shared.shown, k - first, beside, CELLS, shared.values)
+            for i in range(more):
+                rays[FRONT + i] = rays[BACK + i]
+            fresh = True
+
+
+@lean
+def classify_all(cut, camera, row, slices, first, last, look, planes, shared, rays, packed):
+    """classify_slabs for more than two positions a pixel: each is sampled."""
+    far, distance = slices.first + slices.slabs * slices.distance, slices.distance
+    n, base = np.uint64(RAYS), np.uint64(0)
+    for g in range(shared.length // RAYS):
         for phase in range(shared.phases):
             x = shared.begin + (g * RAYS * shared.phases + phase) / shared.fine
             start_positions(n, base, x, shared.phases / shared.fine, camera, row, far, rays)
             ray_stretch(n, base, cut, row, slices.first, rays)
             bounds, fresh = block_bounds(n, base, rays), False
             for k in range(first, last):
-                depth = slices.first + k * slices.distance
-                after = depth + slices.distance
+                depth = slices.first + k * distance
                 place = np.uint64(((k - first) * shared.phases + phase) * SLAB_ROWS * LINE + g * RAYS)
-                if not (seen(bounds, depth, cut, planes.marks, k) or seen(bounds, after, cut, planes.marks, k + 1)):
+                if not (
+                    seen(bounds, depth, cut, planes.marks, k)
+                    or seen(bounds, depth + distance, cut, planes.marks, k + 1)
+                ):
                     fresh = False
-                    for c in range(4):
-                        clear = place + np.uint64(c * LINE)
-                        for i in range(n):
-                            shared.values[clear + i] = ZERO
+                    clear_block(n, place, shared.values)
                     continue
-                if not fresh:
-                    sample_volume(n, base, depth, cut, row, planes, FRONT, rays)
-                sample_volume(n, base, after, cut, row, planes, BACK, rays)
-                share_of_slab(n, base, depth, slices.distance, rays)
-                trim_ends(n, base, cut, row, depth, slices.distance, rays)
-                classify(n, base, table, planes.place, rays, packed)
+                classify_block(n, base, cut, row, depth, distance, fresh, look, planes, rays, packed)
+                keep_block(n, base, place, shared.values, rays)
+                note_shown(shared.shown, k - first, place, RAYS, shared.values)
                 for i in range(n):
-                    optical = rays[base + OPTICAL + i] * rays[base + SHARE + i] * rays[base + LENGTH + i]
-                    rays[base + SHARE + i] = ONE - exp2_fast(-optical)
-                    rays[base + T + i] = ONE
-                    rays[base + R + i] = ZERO
-                    rays[base + G + i] = ZERO
-                    rays[base + B + i] = ZERO
-                if light_slab(n, base, 0.5 * (depth + after), cut, row, False, planes, rays):
-                    blend(n, base, material, light, rays, packed)
-                for i in range(n):
-                    shared.values[place + RED + i] = rays[base + R + i]
-                    shared.values[place + GREEN + i] = rays[base + G + i]
-                    shared.values[place + BLUE + i] = rays[base + B + i]
-                    shared.values[place + LESS + i] = -rays[base + SHARE + i]
                     rays[base + FRONT + i] = rays[base + BACK + i]
-                note_shown(base, shared.shown, k - first, g, rays)
                 fresh = True
+
+
+@inlined
+def classify_slabs(cut, camera, row, slices, first, last, ways, planes, shared, rays, packed):
+    """Fill shared.values with slabs first … last."""
+    m = ways.material
+    look = (ways.table, (np.float32(m[0]), np.float32(m[1]), np.float32(m[2])), ways.light)
+    shared.shown[:, :] = np.uint8(0)
+    if shared.fine <= 2:
+        args = (cut, camera, row, slices, first, last, look, ways.plain, planes, shared, rays, packed)
+        classify_cells(*args)
+    else:
+        classify_all(cut, camera, row, slices, first, last, look, planes, shared, rays, packed)

@@ -45,13 +45,15 @@ BYTE = np.float32(255.0)
 class Ways(NamedTuple):
     """How volumes are drawn.
 
-    mode: COMPOSITE, MIP or ISO; table: pre-integrated slabs, see make_table; material = (ambient, diffuse, specular);
-    light = (channels, colours); colors: of all levels for MIP, in the first row that of an isosurface; level: of the
-    surface, as a row of the table; shade; own_eyes: highlights for a ray's own eye, not the centre's.
+    mode: COMPOSITE, MIP or ISO; table, plain: pre-integrated slabs, see make_table, make_plain; material = (ambient,
+    diffuse, specular); light = (channels, colours); colors: of all levels for MIP, in the first row that of an
+    isosurface; level: of the surface, as a row of the table; shade; own_eyes: highlights for a ray's own eye, not the
+    centre's.
     """
 
     mode: int
     table: np.ndarray
+    plain: np.ndarray
     material: tuple
     light: tuple
     colors: np.ndarray
@@ -274,8 +276,7 @@ def draw_shared_rows(rows, cut, camera, slices, ways, offsets, groups, planes, s
             last = min(k + SLABS, slices.slabs)
             if k > 0:
                 hide_behind_views(views, width, offsets, camera, cut, slices, k, last, planes, line)
-            args = (ways.table, ways.material, ways.light, planes, shared, rays, packed)
-            classify_slabs(cut, camera, row, slices, k, last, *args)
+            classify_slabs(cut, camera, row, slices, k, last, ways, planes, shared, rays, packed)
             for g in range(len(begins) - 1):
                 near, place = offsets[begins[g] : begins[g + 1]], begins[g] * SLAB_ROWS * LINE
                 blend_group(near, width, camera, slices, k, last, size, shared, bundles, place, line)
