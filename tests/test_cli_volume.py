@@ -185,7 +185,7 @@ def test_the_first_run_of_every_primitive_says_that_it_compiles(
     Path("points.xyz").write_text("0 0 0\n1 0 0\n0 1 0\n0 0 1\n")
     panel, stack = ("render", "-d", "alioscopy-8"), ("views", "-o", "v")
     for arguments, kernels in (
-        ((*panel, "a.raw", *RAW), ["draw_panel_rows-"]),
+        ((*panel, "a.raw", *RAW), ["draw_woven_rows-"]),
         ((*stack, "a.raw", *RAW), ["draw_shared_rows-"]),
         ((*stack, "a.raw", *RAW, "--volume", "exact"), ["draw_rows-"]),
         ((*panel, "points.xyz"), ["splat_panel-"]),
@@ -207,8 +207,9 @@ def test_names_of_kernels_are_those_of_the_engine() -> None:
     modules = (mesh_panel, mesh_views, points_panel, points_views, volume_panel, volume_views)
     every = [samples.shells(16), samples.surfel_cloud(100), aus.Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [[0, 1, 2]])]
     for scene in (aus.Scene(every), aus.Scene(every[:1])):
-        for panel in (False, True):
-            for name in kernels_for(scene, panel, Options()):
+        for display in (None, "alioscopy-8", "looking-glass-portrait", "wavelength-selective"):
+            viewmap = None if display is None else aus.Display.preset(display).viewmap
+            for name in kernels_for(scene, viewmap, Options()):
                 assert any(hasattr(module, name.removesuffix("-")) for module in modules)
 
 

@@ -12,9 +12,9 @@ from . import common
 
 KERNELS = {  # by which one sees whether this run compiles
     "mesh": ("draw_views", "draw_panel"),
-    "volume": ("draw_shared_rows", "draw_panel_rows"),
+    "volume": ("draw_shared_rows", "draw_panel_rows", "draw_woven_rows", "draw_rows", "draw_panel_rays"),
     "points": ("splat_",),
-    "papers": ("draw_views", "draw_panel", "draw_shared_rows", "draw_panel_rows", "splat_"),
+    "papers": ("draw_views", "draw_panel", "draw_shared_rows", "draw_woven_rows", "splat_"),
 }
 
 

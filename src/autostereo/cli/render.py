@@ -72,7 +72,7 @@ def render(
     from ..render import render as draw
 
     rig = rig or Rig.frame(scene, where, side)
-    one_pass = where.viewmap is not None and method == "single-pass"
+    one_pass = where.viewmap if method == "single-pass" else None
     common.announce_compilation(engine, *kernels_for(scene, one_pass, options))
     start = perf_counter()
     with common.working("rendering"):

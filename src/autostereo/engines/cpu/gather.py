@@ -130,7 +130,7 @@ def row_camera(r, width, table, a, b, offsets, cell_mode, height, views, continu
 
 
 @kernel
-def _row_views(r, width, m, u, out):
+def row_views(r, width, m, u, out):
     """Fill out (3W,) int32 with the nearest view of each sub-pixel of row r; u (W, 3) is scratch."""
     row_camera(
         r, width, m.table, m.a, m.b, m.offsets, m.cell_mode, m.height, m.views, m.continuous, m.reverse, u
@@ -148,7 +148,7 @@ def _interlace_rows(views, m, flip_x, flip_y, rows, out):
     height, width = out.shape[0], out.shape[1]
     u, view = np.empty((width, 3)), np.empty(3 * width, np.int32)
     for r in range(rows[0], rows[1]):
-        _row_views(r, width, m, u, view)
+        row_views(r, width, m, u, view)
         source, target = views[:, height - 1 - r if flip_y else r], out[r]
         for x in range(width):
             column = width - 1 - x if flip_x else x
@@ -187,7 +187,7 @@ def _merge_rows(picture, index, m, flips, rows, out):
     height, width = out.shape[0], out.shape[1]
     u, view = np.empty((width, 3)), np.empty(3 * width, np.int32)
     for r in range(rows[0], rows[1]):
-        _row_views(r, width, m, u, view)
+        row_views(r, width, m, u, view)
         source, target = picture[height - 1 - r if flips[1] else r], out[r]
         for x in range(width):
             column = width - 1 - x if flips[0] else x
@@ -245,7 +245,7 @@ def _weave_nearest(quilt, tiles, m, flips, rows, out):
         for c in range(3):
             column[3 * x + c] = _nearest_tap(x, width, tiles.width, flips[0]) * tiles.channels + c
     for r in range(rows[0], rows[1]):
-        _row_views(r, width, m, u, view)
+        row_views(r, width, m, u, view)
         _tile_rows(tiles, _nearest_tap(r, height, tiles.height, flips[1]), start)
         target = out[r].reshape(-1)
         for i in range(3 * width):

@@ -15,6 +15,8 @@ from ...scene.volume import Volume
 from ..engine import Camera, Draw
 from ..options import Options
 from ..volumes import Slices, half_spaces, make_slices
+from .gather import map_args
+from .kernels import is_joined, is_woven
 from .memory import Memory
 from .mesh import panel_lines
 from .mesh_panel import Panel
@@ -37,7 +39,7 @@ from .volume_setup import (
     shown_blocks,
 )
 from .volume_shared import LINE, SLAB_ROWS, SPAN, Shared
-from .volume_views import ISO, MIP, Ways, draw_rows, draw_shared_rows
+from .volume_views import ISO, MIP, Ways, draw_rows, draw_shared_rows, draw_woven_rows
 
 MODES = ("composite", "mip", "iso")  # in the order of volume_views
 RUN_STEP = 0.5  # voxels, a sixteenth of a run
@@ -254,13 +256,15 @@ def new_shared(camera: Camera, slices: Slices, offsets: NDArray[np.float64], fin
 def _draw_shared(
     prepared: PreparedVolumes, index: int, draw: Draw, slices: Slices, color: NDArray[np.uint8], memory: Memory
 ) -> None:
-    """Draw volume `index` from slabs that all views share, over color (V, H, W, 4)."""
+    """Draw volume `index` from slabs that all views share, over color (V, H, W, 4) or a panel color (H, W, 3)."""
     camera, offsets = draw.camera, draw.offsets
     numbers, slices = camera_numbers(camera), share_slices(slices, camera, offsets, SLIDE[0])
     cut, ways = make_cut(prepared, index, draw, slices, memory)
     samples = samples_of(prepared, index, camera, cut)
     pixel = slices.first / camera.fx * float(np.abs(cut.from_eye[:, 0]).max())  # of the nearest one, in voxels
     fine = int(np.clip(np.ceil(FINE_VIEWS[2] * pixel), FINE_VIEWS[0], FINE_VIEWS[1]))
+    if draw.viewmap is not None:
+        fine = 1  # as where sub-pixels are looked up: of each view a panel shows a few
     groups = plan_bundles(camera, slices, offsets, fine, pixel)
     key = (
         "volume shared",
@@ -280,15 +284,20 @@ def _draw_shared(
             np.zeros(SHARED_BLOCKS * BLOCK_ROWS * ROW, np.float32),
             np.zeros(ROW, np.int32),
             np.zeros(len(offsets) * SLAB_ROWS * LINE, np.float32),
+            (np.zeros((camera.width, 3), np.float64), np.zeros(3 * camera.width, np.int32)),
         ),
     )
 
     def task(first: int, end: int) -> None:
-        with pool as (planes, slabs, rays, packed, line):
-            args = (ways, offsets, groups, planes, slabs, rays, packed, line, color)
-            draw_shared_rows((first, end), cut, numbers, slices, *args)
+        with pool as (planes, slabs, rays, packed, line, scratch):
+            args = (cut, numbers, slices, ways, offsets, groups, planes, slabs, rays, packed, line)
+            if draw.viewmap is None:
+                draw_shared_rows((first, end), *args, color)
+            else:
+                weave = (map_args(draw.viewmap), draw.flip_x, draw.flip_y, *scratch)
+                draw_woven_rows((first, end), *args, weave, color)
 
-    run_rows(draw.camera.height, task)
+    run_rows(camera.height, task)
 
 
 def draw_volume_panel(
@@ -307,13 +316,17 @@ def draw_volume_panel(
     assert draw.viewmap is not None
     plan = panel_lines(draw, memory)
     panel = Panel(plan, draw.flip_x, draw.flip_y, options.sampling == "subpixel")
-    joined = draw.viewmap.per_pixel and not panel.subpixel  # a view's worth of rays: exact ones are cheaper, too
+    joined = is_joined(draw.viewmap, options)
     averaged = options.alpha == "averaged" and not joined
     numbers = camera_numbers(camera)
     may_share = not joined and depth.size == 0 and can_share(camera, slices, np.array([plan.low, plan.high]))
     reach = np.array([plan.low, plan.high])
+    woven = is_woven(draw.viewmap, options)
     for group in volume_groups(prepared, opaque):
         shared = may_share and is_shared(prepared, group, options)
+        if shared and woven:
+            _draw_shared(prepared, group[0], draw, slices, color, memory)
+            continue
         own = share_slices(slices, camera, reach, SLIDE[1]) if shared else slices
         made = [make_cut(prepared, index, draw, own, memory) for index in group]
         cuts, ways = tuple(cut for cut, _ in made), tuple(way for _, way in made)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .gather import row_views
 from .jit import inlined, kernel, lean
 from .simd import LANES, greater, lesser, load, mask_word, splat, store, to_float, to_int
 from .volume_blend import blend_group, clear_line, even_out, load_sums
@@ -255,32 +256,62 @@ def hide_behind_views(views, width, offsets, camera, cut, slices, k, last, plane
     hide_runs(k, last, planes)
 
 
-@kernel
-def draw_shared_rows(rows, cut, camera, slices, ways, offsets, groups, planes, slabs, rays, packed, line, color):
-    """Draw rows (first, end) of every view from slabs that they share, over color (V, H, W, 4).
+@lean
+def sum_views(cut, camera, row, slices, ways, width, offsets, groups, planes, slabs, rays, packed, line):
+    """Sum the slabs of one row of the picture, that all views share, into a line of each view.
 
     groups = (slabs in a bundle, where groups of views begin); slabs = (shared, bundles).
     """
     shared, bundles = slabs
     size, begins = groups
+    views = len(offsets)
+    for v in range(views):
+        clear_line(np.uint64(width), np.uint64(v * SLAB_ROWS * LINE), line)
+    for k in range(0, slices.slabs, SLABS):
+        last = min(k + SLABS, slices.slabs)
+        if k > 0:
+            hide_behind_views(views, width, offsets, camera, cut, slices, k, last, planes, line)
+        classify_slabs(cut, camera, row, slices, k, last, ways, planes, shared, rays, packed)
+        for g in range(len(begins) - 1):
+            near, place = offsets[begins[g] : begins[g + 1]], begins[g] * SLAB_ROWS * LINE
+            blend_group(near, width, camera, slices, k, last, size, shared, bundles, place, line)
+    middle = slices.first + 0.5 * slices.slabs * slices.distance
+    for v in range(views):
+        even_out(width, offsets[v], middle, camera, row, np.uint64(v * SLAB_ROWS * LINE), line)
+
+
+@kernel
+def draw_shared_rows(rows, cut, camera, slices, ways, offsets, groups, planes, slabs, rays, packed, line, color):
+    """Draw rows (first, end) of every view from slabs that they share, over color (V, H, W, 4); see sum_views."""
     views, height, width, _ = color.shape
     words = color.reshape(-1).view(np.int32)
     for r in range(rows[0], rows[1]):
-        slope = (camera.centre_y - (r + 0.5)) / camera.fy - camera.offset_y / camera.focal
-        row = (slope, camera.offset_y)
+        row = ((camera.centre_y - (r + 0.5)) / camera.fy - camera.offset_y / camera.focal, camera.offset_y)
         if mark_runs(cut, row, slices, planes.marks) == 0:
             continue
+        sum_views(cut, camera, row, slices, ways, width, offsets, groups, planes, slabs, rays, packed, line)
         for v in range(views):
-            clear_line(np.uint64(width), np.uint64(v * SLAB_ROWS * LINE), line)
-        for k in range(0, slices.slabs, SLABS):
-            last = min(k + SLABS, slices.slabs)
-            if k > 0:
-                hide_behind_views(views, width, offsets, camera, cut, slices, k, last, planes, line)
-            classify_slabs(cut, camera, row, slices, k, last, ways, planes, shared, rays, packed)
-            for g in range(len(begins) - 1):
-                near, place = offsets[begins[g] : begins[g + 1]], begins[g] * SLAB_ROWS * LINE
-                blend_group(near, width, camera, slices, k, last, size, shared, bundles, place, line)
-        for v in range(views):
-            t, middle = np.uint64(v * SLAB_ROWS * LINE), slices.first + 0.5 * slices.slabs * slices.distance
-            even_out(width, offsets[v], middle, camera, row, t, line)
-            finish_line(width, t, line, (v * height + r) * width, words)
+            finish_line(width, np.uint64(v * SLAB_ROWS * LINE), line, (v * height + r) * width, words)
+
+
+@kernel
+def draw_woven_rows(rows, cut, camera, slices, ways, offsets, groups, planes, slabs, rays, packed, line, weave, color):
+    """Draw rows (first, end) of a panel color (H, W, 3), each sub-pixel from the line of its view; see sum_views.
+
+    weave = (view map, flip x, flip y, u (W, 3) float64, views (3·W,) int32): the last two scratch.
+    """
+    viewmap, flip_x, flip_y, u, shown_views = weave
+    height, width, _ = color.shape
+    for r in range(rows[0], rows[1]):
+        row = ((camera.centre_y - (r + 0.5)) / camera.fy - camera.offset_y / camera.focal, camera.offset_y)
+        if mark_runs(cut, row, slices, planes.marks) == 0:
+            continue
+        sum_views(cut, camera, row, slices, ways, width, offsets, groups, planes, slabs, rays, packed, line)
+        shown = height - 1 - r if flip_y else r
+        row_views(shown, width, viewmap, u, shown_views)
+        for x in range(width):
+            i = width - 1 - x if flip_x else x
+            for c in range(3):
+                t = np.uint64(shown_views[3 * x + c] * SLAB_ROWS * LINE + i)
+                front, through = line[t + np.uint64(c * LINE)], line[t + ALPHA]
+                color[shown, x, c] = over(front, through, color[shown, x, c])
