@@ -207,7 +207,7 @@ def test_names_of_kernels_are_those_of_the_engine() -> None:
     modules = (mesh_panel, mesh_views, points_panel, points_views, volume_panel, volume_views)
     every = [samples.shells(16), samples.surfel_cloud(100), aus.Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [[0, 1, 2]])]
     for scene in (aus.Scene(every), aus.Scene(every[:1])):
-        for display in (None, "alioscopy-8", "looking-glass-portrait", "wavelength-selective"):
+        for display in (None, "alioscopy-8", "looking-glass-portrait", "lenticular-8"):
             viewmap = None if display is None else aus.Display.preset(display).viewmap
             for name in kernels_for(scene, viewmap, Options()):
                 assert any(hasattr(module, name.removesuffix("-")) for module in modules)

@@ -44,6 +44,7 @@ from .volume_views import ISO, MIP, Ways, draw_rows, draw_shared_rows, draw_wove
 MODES = ("composite", "mip", "iso")  # in the order of volume_views
 RUN_STEP = 0.5  # voxels, a sixteenth of a run
 SHARED_BLOCKS = 3  # of rays: sampled ones, what lies between, and those of it that are sampled, too
+WIDEST_PAIR = 1.25  # voxels between sampled positions, up to which what lies between is interpolated
 FINE_VIEWS = (1, 8, 3)  # positions of a shared slab: least and most per pixel, and per voxel between them
 
 
@@ -243,14 +244,20 @@ def draw_volume_views(
             np.minimum(depth, nearest, out=depth)
 
 
-def new_shared(camera: Camera, slices: Slices, offsets: NDArray[np.float64], fine: int, phases: int) -> Shared:
+def pixel_of(cut: Cut, camera: Camera, slices: Slices) -> float:
+    """Width of the nearest pixel, in voxels."""
+    return float(slices.first / camera.fx * np.abs(cut.from_eye[:, 0]).max())
+
+
+def new_shared(camera: Camera, slices: Slices, offsets: NDArray[np.float64], fine: int, pixel: float) -> Shared:
     """One thread's memory for shared slabs that reach as far as the views see."""
-    begin, count = shared_reach(camera, slices, offsets, fine, phases)
-    values = np.zeros(SLABS * phases * SLAB_ROWS * LINE, np.float32)
+    begin, count = shared_reach(camera, slices, offsets)
+    paired = fine <= 2 and 2 * pixel / fine <= WIDEST_PAIR
+    values = np.zeros(SLABS * fine * SLAB_ROWS * LINE, np.float32)
     shown = np.zeros((SLABS, count // SPAN + 1), np.uint8)  # one more: pixels are drawn in whole SIMD steps
     places, parts = np.zeros((SLABS, 3), np.int64), np.zeros(SLABS, np.float32)
     front, back, picked = (np.zeros(ROW, np.int32) for _ in range(3))
-    return Shared(begin, fine, phases, count, values, shown, places, parts, front, back, picked)
+    return Shared(begin, fine, paired, count, values, shown, places, parts, front, back, picked)
 
 
 def _draw_shared(
@@ -261,7 +268,7 @@ def _draw_shared(
     numbers, slices = camera_numbers(camera), share_slices(slices, camera, offsets, SLIDE[0])
     cut, ways = make_cut(prepared, index, draw, slices, memory)
     samples = samples_of(prepared, index, camera, cut)
-    pixel = slices.first / camera.fx * float(np.abs(cut.from_eye[:, 0]).max())  # of the nearest one, in voxels
+    pixel = pixel_of(cut, camera, slices)
     fine = int(np.clip(np.ceil(FINE_VIEWS[2] * pixel), FINE_VIEWS[0], FINE_VIEWS[1]))
     if draw.viewmap is not None:
         fine = 1  # as where sub-pixels are looked up: of each view a panel shows a few
@@ -269,6 +276,7 @@ def _draw_shared(
     key = (
         "volume shared",
         fine,
+        pixel,
         samples,
         slices,
         camera.width,
@@ -280,7 +288,7 @@ def _draw_shared(
         key,
         lambda: (
             new_planes(samples, slices),
-            tuple(new_shared(camera, slices, offsets, fine, fine) for _ in range(2)),
+            tuple(new_shared(camera, slices, offsets, fine, pixel) for _ in range(2)),
             np.zeros(SHARED_BLOCKS * BLOCK_ROWS * ROW, np.float32),
             np.zeros(ROW, np.int32),
             np.zeros(len(offsets) * SLAB_ROWS * LINE, np.float32),
@@ -331,7 +339,8 @@ def draw_volume_panel(
         made = [make_cut(prepared, index, draw, own, memory) for index in group]
         cuts, ways = tuple(cut for cut, _ in made), tuple(way for _, way in made)
         counts = [samples_of(prepared, index, camera, cut) for index, cut in zip(group, cuts, strict=True)]
-        pool = _panel_pool(group, counts, draw, own, plan if shared else None, memory)
+        pixel = pixel_of(cuts[0], camera, own)
+        pool = _panel_pool(group, counts, draw, own, pixel, plan if shared else None, memory)
 
         def task(
             first: int, end: int, cuts: Any = cuts, ways: Any = ways, pool: Any = pool, own: Slices | None = own,
@@ -354,6 +363,7 @@ def _panel_pool(
     counts: list[int],
     draw: Draw,
     slices: Slices,
+    pixel: float,
     plan: LinePlan | None,
     memory: Memory,
 ) -> Any:
@@ -369,8 +379,8 @@ def _panel_pool(
             np.zeros(ROW, np.int32),
             np.zeros(0 if plan is None else PIXEL_ROWS * ROW * 3 * -(-width // RAYS), np.float32),
         )
-        slabs = None if plan is None else new_shared(camera, slices, reach, 1, 1)
+        slabs = None if plan is None else new_shared(camera, slices, reach, 1, pixel)
         return tuple(new_planes(n, slices) for n in counts), slabs, scratch
 
-    key = (("volume panel", *group), *counts, width, slices, camera.fx, camera.focal, reach.tobytes())
+    key = (("volume panel", *group), *counts, width, slices, pixel, camera.fx, camera.focal, reach.tobytes())
     return memory.pool(key, make)

@@ -48,7 +48,7 @@ def store_sums(i, sums, line):
 @inlined
 def place_slab(k, at, slabs):
     """Where what pixel 0 sees of slab k, position `at`, is kept."""
-    phases = slabs.phases
+    phases = slabs.fine
     m = np.int64(np.floor(at))
     q, phase, slab = m // phases, m % phases, k * phases
     beside = (slab + phase + 1) * SLAB_ROWS * LINE if phase + 1 < phases else slab * SLAB_ROWS * LINE + 1
@@ -107,13 +107,13 @@ def merge_slabs(first, last, bundle, begin, end, slabs, bundles):
     """Blend placed slabs first … last into positions begin … end of a phase of a bundle, which is a slab again."""
     one = np.uint64(LANES)
     two = one + one
-    phase = bundle % slabs.phases
-    bundle //= slabs.phases
+    phase = bundle % slabs.fine
+    bundle //= slabs.fine
     zero, whole = splat(ZERO), splat(ONE)
     clear = (zero, zero, zero, whole)
     for q in range(begin, end, STEP):
         sums, some = add_slabs(first, last, q, slabs, (clear, clear, clear))
-        i = np.uint64((bundle * slabs.phases + phase) * SLAB_ROWS * LINE + q)
+        i = np.uint64((bundle * slabs.fine + phase) * SLAB_ROWS * LINE + q)
         store_sums(i, less_of(sums[0]), bundles.values)
         store_sums(i + one, less_of(sums[1]), bundles.values)
         store_sums(i + two, less_of(sums[2]), bundles.values)
@@ -138,12 +138,12 @@ def make_bundles(offsets, width, camera, slices, first, last, size, shared, bund
         bundles.shown[b, :] = np.uint8(0)
         left = (min(-low * middle, -high * middle) - shared.begin) * shared.fine
         right = (max(-low * middle, -high * middle) + width - shared.begin) * shared.fine
-        left, right = np.int64(np.floor(left)) // shared.phases, np.int64(np.ceil(right)) // shared.phases + 2
-        for phase in range(shared.phases):
+        left, right = np.int64(np.floor(left)) // shared.fine, np.int64(np.ceil(right)) // shared.fine + 2
+        for phase in range(shared.fine):
             for k in range(begin, end):
                 slip = 0.5 * (low + high) * (middle - shift_of(camera, slices, k))
                 place_slab(k - first, phase + slip * shared.fine, shared)
-            merge_slabs(begin - first, end - first, b * shared.phases + phase, left, right, shared, bundles)
+            merge_slabs(begin - first, end - first, b * shared.fine + phase, left, right, shared, bundles)
 
 
 @lean

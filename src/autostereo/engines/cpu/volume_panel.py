@@ -43,7 +43,7 @@ def blend_pixels(blocks, averaged, camera, slices, first, last, shared, pixels, 
     """Add slabs first … last to the sub-pixels of a row, in blocks of RAYS for each channel, each at its own place."""
     n = np.uint64(RAYS)
     stride = PIXEL_ROWS * ROW
-    bound = np.float32(shared.length * shared.phases - 2)
+    bound = np.float32(shared.length - 2)
     for b in range(blocks):
         low, high = pixels[3 * b * stride + MOVE], pixels[3 * b * stride + MOVE]
         left, right = pixels[3 * b * stride + AT], pixels[3 * b * stride + AT]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..engine import Camera
 from ..volumes import MAX_PLANES, Slices
-from .volume_shared import CELLS, MAX_LENGTH
+from .volume_shared import MAX_LENGTH, PAIRS
 
 STEEPEST = 1.0  # greatest offset of a camera over the nearest depth, up to which views may share slabs
 BUNDLES = (2, 4, 8)  # slabs blended once for a group of views; whole parts of SLABS
@@ -26,21 +26,19 @@ def share_slices(slices: Slices, camera: Camera, offsets: NDArray[np.float64], m
     return Slices(slices.first, slices.distance / parts, slices.slabs * parts)
 
 
-def shared_reach(
-    camera: Camera, slices: Slices, offsets: NDArray[np.float64], fine: int, phases: int
-) -> tuple[float, int]:
-    """Where shared slabs begin, in pixels, and their positions of a phase, so that they reach as far as views see."""
+def shared_reach(camera: Camera, slices: Slices, offsets: NDArray[np.float64]) -> tuple[float, int]:
+    """Where shared slabs begin, in pixels, and their length, in pixels, so that they reach as far as views see."""
     ends = np.array([slices.first, slices.first + slices.slabs * slices.distance])
     shifts = np.outer(offsets, camera.fx / camera.focal - camera.fx / ends)
     begin = float(np.floor(-shifts.max())) - 2.0
-    positions = (camera.width - float(shifts.min()) + 2.0 - begin) * fine
-    return begin, -(-int(np.ceil(positions / phases) + 2) // (2 * CELLS)) * (2 * CELLS)
+    length = int(np.ceil(camera.width - float(shifts.min()) + 4.0 - begin))
+    return begin, -(-length // (2 * PAIRS)) * (2 * PAIRS)
 
 
 def can_share(camera: Camera, slices: Slices, offsets: NDArray[np.float64]) -> bool:
     """Whether slabs may be shared: not by cameras amid the volume, which see a slab from all sides."""
     flat = float(np.abs(offsets).max()) <= STEEPEST * slices.first
-    return flat and shared_reach(camera, slices, offsets, 1, 1)[1] <= MAX_LENGTH
+    return flat and shared_reach(camera, slices, offsets)[1] <= MAX_LENGTH
 
 
 def view_groups(offsets: NDArray[np.float64], most: float) -> NDArray[np.int64]:
@@ -62,7 +60,7 @@ def plan_bundles(
     after = slices.first + slices.distance
     apart = camera.fx * (1 / slices.first - 1 / after)  # pixels between the two, per unit of offset
     slip = min(SLIP[0], SLIP[1] / pixel)
-    _, length = shared_reach(camera, slices, offsets, fine, fine)
+    _, length = shared_reach(camera, slices, offsets)
     wider = length / camera.width * fine
     plans = [(1, view_groups(offsets, np.inf))]
     for size in BUNDLES:

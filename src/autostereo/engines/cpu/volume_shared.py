@@ -3,7 +3,7 @@
 Between views a slab moves by `offset · parallax` pixels (DESIGN section 1), so a view's slab is that of the centre
 camera, shifted and linearly interpolated: contiguous loads, no tables, no gathers. Against blur the centre camera's
 slabs are sampled `fine` times as densely as pixels. Position m of a slab lies at x = begin + m/fine; it is kept at
-[m mod phases][m div phases], so that what lies `phases` positions apart, such as a view's pixels, is contiguous.
+[m mod fine][m div fine]: each such phase, of what lies a pixel apart, is contiguous.
 
 Slabs are as long here as the centre camera sees them. A view sees them a few percent longer or shorter, by about the
 same factor all along a ray: its transmittance is the product to that power, its colour is scaled alike (even_out).
@@ -68,7 +68,7 @@ RED, GREEN, BLUE, ALPHA = (np.uint64(k * LINE) for k in range(4))
 LESS = ALPHA  # of slabs: opacity, negative, so that one fused operation takes it away
 SLAB_ROWS = 4
 POSITION, NEAR, BESIDE = 0, 1, 2
-CELLS = 128  # pairs of positions that are handled together: one sampled, one between that and the next
+PAIRS = 128  # pairs of positions that are handled together: one sampled, one between that and the next
 BEND, THREE = np.float32(0.016), np.float32(3.0)  # 16 times how far a value may depart from what it is interpolated to
 SPAN = 32  # positions of a phase of which it is known whether something is seen
 
@@ -76,16 +76,17 @@ SPAN = 32  # positions of a phase of which it is known whether something is seen
 class Shared(NamedTuple):
     """Classified slabs of one chunk, one thread's memory.
 
-    begin: x of position 0; fine, phases: see above; length: positions of a phase, in whole blocks; values
-    (SLABS · phases · 4 · LINE,) float32: colour times opacity, and LESS; shown (SLABS, length / SPAN) uint8: in
-    which spans something is seen; the others are zero; places (SLABS, 3) int64, parts (SLABS,) float32: of pixel 0 of a
-    view, its position, where its left and right neighbours are kept, and how far it is from the left one to the right;
-    front, back, picked (ROW,) int32: scratch for what lies between sampled positions.
+    begin: x of position 0; fine: positions a pixel; paired: see classify_pairs, for no more than two a pixel; length:
+    positions of a phase, in whole blocks; values (SLABS · fine · 4 · LINE,) float32: colour times opacity, and LESS;
+    shown (SLABS, length / SPAN) uint8: in which spans something is seen; the others are zero; places (SLABS, 3) int64,
+    parts (SLABS,) float32: of pixel 0 of a view, its position, where its left and right neighbours are kept, and how
+    far it is from the left one to the right; front, back, picked (ROW,) int32: scratch for what lies between sampled
+    positions.
     """
 
     begin: float
     fine: int
-    phases: int
+    paired: bool
     length: int
     values: np.ndarray
     shown: np.ndarray
@@ -257,16 +258,16 @@ def note_shown(shown, k, place, positions, values):
 
 
 @lean
-def classify_cells(cut, camera, row, slices, first, last, look, plain, planes, shared, rays, packed):
-    """classify_slabs for one or two positions a pixel: every second one is sampled, what lies between where needed."""
-    n, more = np.uint64(CELLS), np.uint64(CELLS + LANES)
+def classify_pairs(cut, camera, row, slices, first, last, look, plain, planes, shared, rays, packed):
+    """classify_slabs in pairs of positions: the first is sampled, the second interpolated where that is near enough."""
+    n, more = np.uint64(PAIRS), np.uint64(PAIRS + LANES)
     between, spare, base = np.uint64(BLOCK_ROWS * ROW), np.uint64(2 * BLOCK_ROWS * ROW), np.uint64(0)
     front, back, picked = shared.front, shared.back, shared.picked
     distance, one = slices.distance, splat(ONE)
     far, wide = slices.first + slices.slabs * distance, 2.0 / shared.fine
-    groups = shared.length * shared.phases // (2 * CELLS)
+    groups = shared.length * shared.fine // (2 * PAIRS)
     for g in range(groups):
-        x = shared.begin + g * CELLS * wide
+        x = shared.begin + g * PAIRS * wide
         start_positions(more, base, x, wide, camera, row, far, rays)
         start_positions(n, between, x + 0.5 * wide, wide, camera, row, far, rays)
         ray_stretch(more, base, cut, row, slices.first, rays)
@@ -274,14 +275,14 @@ def classify_cells(cut, camera, row, slices, first, last, look, plain, planes, s
         bounds, fresh = block_bounds(more, base, rays), False
         for k in range(first, last):
             depth = slices.first + k * distance
-            slab = (k - first) * shared.phases
-            place = np.uint64(slab * SLAB_ROWS * LINE + g * CELLS * 2 // shared.phases)
+            slab = (k - first) * shared.fine
+            place = np.uint64(slab * SLAB_ROWS * LINE + g * PAIRS * 2 // shared.fine)
             beside = place + np.uint64(SLAB_ROWS * LINE)
             if not (
                 seen(bounds, depth, cut, planes.marks, k) or seen(bounds, depth + distance, cut, planes.marks, k + 1)
             ):
                 fresh = False
-                if shared.phases == 1:
+                if shared.fine == 1:
                     clear_block(n + n, place, shared.values)
                 else:
                     clear_block(n, place, shared.values)
@@ -297,17 +298,17 @@ def classify_cells(cut, camera, row, slices, first, last, look, plain, planes, s
             m = fill_between(n, front, back, picked, between, rays)
             if m > np.uint64(0):
                 sample_picked(m, picked, cut, row, depth, distance, look, planes, between, spare, rays, packed)
-            if shared.phases == 1:
+            if shared.fine == 1:
                 keep_row_of_both(n, R, between, one, place + RED, shared.values, rays)
                 keep_row_of_both(n, G, between, one, place + GREEN, shared.values, rays)
                 keep_row_of_both(n, B, between, one, place + BLUE, shared.values, rays)
                 keep_row_of_both(n, SHARE, between, splat(-ONE), place + LESS, shared.values, rays)
-                note_shown(shared.shown, k - first, place, 2 * CELLS, shared.values)
+                note_shown(shared.shown, k - first, place, 2 * PAIRS, shared.values)
             else:
                 keep_block(n, base, place, shared.values, rays)
                 keep_block(n, between, beside, shared.values, rays)
-                note_shown(shared.shown, k - first, place, CELLS, shared.values)
-                note_shown(shared.shown, k - first, beside, CELLS, shared.values)
+                note_shown(shared.shown, k - first, place, PAIRS, shared.values)
+                note_shown(shared.shown, k - first, beside, PAIRS, shared.values)
             for i in range(more):
                 rays[FRONT + i] = rays[BACK + i]
             fresh = True
@@ -315,18 +316,18 @@ def classify_cells(cut, camera, row, slices, first, last, look, plain, planes, s
 
 @lean
 def classify_all(cut, camera, row, slices, first, last, look, planes, shared, rays, packed):
-    """classify_slabs for more than two positions a pixel: each is sampled."""
+    """classify_slabs where every position is sampled."""
     far, distance = slices.first + slices.slabs * slices.distance, slices.distance
     n, base = np.uint64(RAYS), np.uint64(0)
     for g in range(shared.length // RAYS):
-        for phase in range(shared.phases):
-            x = shared.begin + (g * RAYS * shared.phases + phase) / shared.fine
-            start_positions(n, base, x, shared.phases / shared.fine, camera, row, far, rays)
+        for phase in range(shared.fine):
+            x = shared.begin + g * RAYS + phase / shared.fine
+            start_positions(n, base, x, 1.0, camera, row, far, rays)
             ray_stretch(n, base, cut, row, slices.first, rays)
             bounds, fresh = block_bounds(n, base, rays), False
             for k in range(first, last):
                 depth = slices.first + k * distance
-                place = np.uint64(((k - first) * shared.phases + phase) * SLAB_ROWS * LINE + g * RAYS)
+                place = np.uint64(((k - first) * shared.fine + phase) * SLAB_ROWS * LINE + g * RAYS)
                 if not (
                     seen(bounds, depth, cut, planes.marks, k)
                     or seen(bounds, depth + distance, cut, planes.marks, k + 1)
@@ -348,8 +349,8 @@ def classify_slabs(cut, camera, row, slices, first, last, ways, planes, shared, 
     m = ways.material
     look = (ways.table, (np.float32(m[0]), np.float32(m[1]), np.float32(m[2])), ways.light)
     shared.shown[:, :] = np.uint8(0)
-    if shared.fine <= 2:
+    if shared.paired:
         args = (cut, camera, row, slices, first, last, look, ways.plain, planes, shared, rays, packed)
-        classify_cells(*args)
+        classify_pairs(*args)
     else:
         classify_all(cut, camera, row, slices, first, last, look, planes, shared, rays, packed)
