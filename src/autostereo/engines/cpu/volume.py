@@ -254,7 +254,7 @@ def new_shared(camera: Camera, slices: Slices, offsets: NDArray[np.float64], fin
     begin, count = shared_reach(camera, slices, offsets)
     paired = fine <= 2 and 2 * pixel / fine <= WIDEST_PAIR
     values = np.zeros(SLABS * fine * SLAB_ROWS * LINE, np.float32)
-    shown = np.zeros((SLABS, count // SPAN + 1), np.uint8)  # one more: pixels are drawn in whole SIMD steps
+    shown = np.zeros((SLABS, (count + 2 * RAYS) // SPAN), np.uint8)  # more: what is drawn are whole SIMD steps
     places, parts = np.zeros((SLABS, 3), np.int64), np.zeros(SLABS, np.float32)
     front, back, picked = (np.zeros(ROW, np.int32) for _ in range(3))
     return Shared(begin, fine, paired, count, values, shown, places, parts, front, back, picked)

@@ -57,7 +57,7 @@ def blend_pixels(blocks, averaged, camera, slices, first, last, shared, pixels, 
             begin = left - max(low * shift, high * shift)
             end = right - min(low * shift, high * shift)
             seen = False
-            for g in range(max(int(begin), 0) // SPAN, min((int(end) + 1) // SPAN, shared.length // SPAN - 1) + 1):
+            for g in range(max(int(begin), 0) // SPAN, min((int(end) + 1) // SPAN, (shared.length - 1) // SPAN) + 1):
                 seen = seen or shared.shown[k - first, g] != 0
             if not seen:
                 continue

@@ -11,7 +11,7 @@ from .volume_shared import MAX_LENGTH, PAIRS
 
 STEEPEST = 1.0  # greatest offset of a camera over the nearest depth, up to which views may share slabs
 BUNDLES = (2, 4, 8)  # slabs blended once for a group of views; whole parts of SLABS
-SLIP = (0.25, 0.07)  # most pixels, and voxels, by which slabs of a bundle are off in a view
+SLIP = (0.25, 0.1)  # most pixels, and voxels, by which slabs of a bundle are off in a view
 SLIDE = (1.0, 2.0)  # most pixels by which a shared slab's front and back part, in views and, coarser by nature, panels
 
 

@@ -68,7 +68,7 @@ RED, GREEN, BLUE, ALPHA = (np.uint64(k * LINE) for k in range(4))
 LESS = ALPHA  # of slabs: opacity, negative, so that one fused operation takes it away
 SLAB_ROWS = 4
 POSITION, NEAR, BESIDE = 0, 1, 2
-PAIRS = 128  # pairs of positions that are handled together: one sampled, one between that and the next
+PAIRS = RAYS - LANES  # of positions that are handled together: one sampled, one between that and the next
 BEND, THREE = np.float32(0.016), np.float32(3.0)  # 16 times how far a value may depart from what it is interpolated to
 SPAN = 32  # positions of a phase of which it is known whether something is seen
 
@@ -143,7 +143,7 @@ def classify_block(n, base, cut, row, depth, distance, fresh, look, planes, rays
 @inlined
 def look_up_plain(n, scalar, plain, numbers, found, rays):
     """Whether the transfer function is plain from each ray's scalar to the next one's."""
-    for i in range(n + np.uint64(1)):
+    for i in range(np.uint64(RAYS)):
         numbers[i] = np.int32(rays[scalar + i] + HALF_WAY)
     for i in range(n):
         found[i] = np.int32(plain[np.uint64((numbers[i] << np.int32(8)) + numbers[i + np.uint64(1)])])
@@ -219,11 +219,12 @@ def sample_picked(m, picked, cut, row, depth, distance, look, planes, between, s
 @inlined
 def keep_block(n, base, place, values, rays):
     """Keep a classified slab."""
-    for i in range(n):
-        values[place + RED + i] = rays[base + R + i]
-        values[place + GREEN + i] = rays[base + G + i]
-        values[place + BLUE + i] = rays[base + B + i]
-        values[place + LESS + i] = -rays[base + SHARE + i]
+    minus = splat(-ONE)
+    for i in range(np.uint64(0), n, np.uint64(LANES)):
+        store(values, place + RED + i, load(rays, base + R + i))
+        store(values, place + GREEN + i, load(rays, base + G + i))
+        store(values, place + BLUE + i, load(rays, base + B + i))
+        store(values, place + LESS + i, load(rays, base + SHARE + i) * minus)
 
 
 @inlined
@@ -247,20 +248,18 @@ def clear_block(n, place, values):
 
 
 @inlined
-def note_shown(shown, k, place, positions, values):
-    """Note in which spans of `positions` positions from `place` on slab k is seen."""
-    for part in range(positions // SPAN):
-        first, seen = place + LESS + np.uint64(part * SPAN), np.int32(0)
-        for i in range(np.uint64(0), np.uint64(SPAN), np.uint64(LANES)):
-            seen |= mask_word(load(values, first + i) < ZERO)
-        if seen != 0:
-            shown[k, (first - LESS) % np.uint64(SLAB_ROWS * LINE) // np.uint64(SPAN)] = np.uint8(1)
+def note_shown(shown, k, place, n, values):
+    """Note in which spans of n positions from `place` on slab k is seen."""
+    row = np.uint64(SLAB_ROWS * LINE)
+    for i in range(np.uint64(0), n, np.uint64(LANES)):
+        if mask_word(load(values, place + LESS + i) < ZERO) != 0:
+            shown[k, (place + i) % row // np.uint64(SPAN)] = np.uint8(1)
 
 
 @lean
 def classify_pairs(cut, camera, row, slices, first, last, look, plain, planes, shared, rays, packed):
     """classify_slabs in pairs of positions: the first is sampled, the second interpolated where that is near enough."""
-    n, more = np.uint64(PAIRS), np.uint64(PAIRS + LANES)
+    n, more = np.uint64(PAIRS), np.uint64(RAYS)
     between, spare, base = np.uint64(BLOCK_ROWS * ROW), np.uint64(2 * BLOCK_ROWS * ROW), np.uint64(0)
     front, back, picked = shared.front, shared.back, shared.picked
     distance, one = slices.distance, splat(ONE)
@@ -290,8 +289,7 @@ def classify_pairs(cut, camera, row, slices, first, last, look, plain, planes, s
                 continue
             classify_block(more, base, cut, row, depth, distance, fresh, look, planes, rays, packed)
             if fresh:
-                for i in range(n):
-                    front[i] = back[i]
+                front, back = back, front
             else:
                 look_up_plain(n, FRONT, plain, packed, front, rays)
             look_up_plain(n, BACK, plain, packed, back, rays)
@@ -303,12 +301,12 @@ def classify_pairs(cut, camera, row, slices, first, last, look, plain, planes, s
                 keep_row_of_both(n, G, between, one, place + GREEN, shared.values, rays)
                 keep_row_of_both(n, B, between, one, place + BLUE, shared.values, rays)
                 keep_row_of_both(n, SHARE, between, splat(-ONE), place + LESS, shared.values, rays)
-                note_shown(shared.shown, k - first, place, 2 * PAIRS, shared.values)
+                note_shown(shared.shown, k - first, place, n + n, shared.values)
             else:
                 keep_block(n, base, place, shared.values, rays)
                 keep_block(n, between, beside, shared.values, rays)
-                note_shown(shared.shown, k - first, place, PAIRS, shared.values)
-                note_shown(shared.shown, k - first, beside, PAIRS, shared.values)
+                note_shown(shared.shown, k - first, place, n, shared.values)
+                note_shown(shared.shown, k - first, beside, n, shared.values)
             for i in range(more):
                 rays[FRONT + i] = rays[BACK + i]
             fresh = True
@@ -319,7 +317,7 @@ def classify_all(cut, camera, row, slices, first, last, look, planes, shared, ra
     """classify_slabs where every position is sampled."""
     far, distance = slices.first + slices.slabs * slices.distance, slices.distance
     n, base = np.uint64(RAYS), np.uint64(0)
-    for g in range(shared.length // RAYS):
+    for g in range(-(-shared.length // RAYS)):
         for phase in range(shared.fine):
             x = shared.begin + g * RAYS + phase / shared.fine
             start_positions(n, base, x, 1.0, camera, row, far, rays)
@@ -337,7 +335,7 @@ def classify_all(cut, camera, row, slices, first, last, look, planes, shared, ra
                     continue
                 classify_block(n, base, cut, row, depth, distance, fresh, look, planes, rays, packed)
                 keep_block(n, base, place, shared.values, rays)
-                note_shown(shared.shown, k - first, place, RAYS, shared.values)
+                note_shown(shared.shown, k - first, place, n, shared.values)
                 for i in range(n):
                     rays[base + FRONT + i] = rays[base + BACK + i]
                 fresh = True
