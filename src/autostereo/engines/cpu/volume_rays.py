@@ -81,7 +81,7 @@ def mix_pair(pair, part):
     return left + part * (np.int32(pair >> np.int64(32)).view(np.float32) - left)
 
 
-@lean
+@inlined
 def sample_volume(n, base, depth, cut, row, planes, scalar, rays):
     """Scalars of the volume itself where rays cross a depth, into row `scalar`."""
     lists, d = planes.lists, np.float32(depth)
@@ -92,7 +92,7 @@ def sample_volume(n, base, depth, cut, row, planes, scalar, rays):
         rays[base + scalar + i] = lists[VALUE + i]
 
 
-@lean
+@inlined
 def light_slab(n, base, middle, cut, row, own_eyes, planes, rays):
     """Light at the middle of a slab into LIT, on rays that see it: SHARE is its opacity. Returns whether any does."""
     lists, chosen, d, own = planes.lists, planes.chosen, np.float32(middle), ONE if own_eyes else ZERO
