@@ -200,7 +200,7 @@ def warped(rows, inverses, offsets, offset, fx, focal):
             column = -1 if len(left) else 0
             k = min(order, key=lambda k: inverses[k][column])
             color[j], near[j] = rows[k][column], inverses[k][column]
-    return np.floor(color + 0.5), near
+    return color, near
 
 
 SLOPE = [1 / w for w in (0.5, 0.46, 0.42, 0.38, 0.34)]  # inverse depths on one line, apart by more than one per cent
@@ -212,6 +212,7 @@ DEPTHS = st.lists(RUNS, min_size=1, max_size=3).map(lambda runs: [d for run in r
 @settings(max_examples=200, deadline=None)
 @example([0.7] * 7 + [0.705] * 7, [-0.28, 0.28], 0)  # seen from the middle, the two pictures do not meet
 @example([0.7] * 7 + [0.705] * 7, [-0.28, 0.28], 9)
+@example([2.0, 1 / 0.46, 2.0, 1 / 0.46, 0.7, 0.7, 0.7], [0.0, -0.016], 2**32 - 1)  # a colour between two bytes, 95.5
 @given(DEPTHS, st.lists(st.floats(-1, 1).map(lambda x: round(x, 3)), min_size=1, max_size=4), st.integers(0, 2**32 - 1))
 def test_rows_are_those_of_the_plain_twin(row, offsets, seed):
     """Random steps, slopes and skies, seen from up to four places in any order, beside or beyond them."""
@@ -226,7 +227,7 @@ def test_rows_are_those_of_the_plain_twin(row, offsets, seed):
             np.testing.assert_array_equal(found.color[k], color[offsets.index(offset)])
             continue
         expected, near = warped(color[:, 0], inverse, offsets, offset, fx, 4.0)
-        np.testing.assert_array_equal(found.color[k, 0], expected)
+        assert np.abs(found.color[k, 0] - expected).max() <= 0.5 + 1e-9  # rounded; a tie may go either way
         with np.errstate(divide="ignore"):
             np.testing.assert_allclose(found.depth[k, 0], 1 / near, rtol=1e-6)
 
