@@ -14,8 +14,8 @@ demo: $(VENV)/run
 	$(BIN)/autostereo demo -o demo
 
 test: lint
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q tests/test_nojit.py
-	$(BIN)/python -m pytest
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -q -n auto --maxprocesses 4 tests/test_nojit.py
+	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
 
 lint: $(VENV)/dev
 	$(BIN)/ruff check .

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import autostereo as aus
-from autostereo.engines.cpu import volume
+from autostereo.engines.cpu import volume, volume_cut
 from autostereo.engines.cpu.volume_plan import view_groups
-from autostereo.engines.cpu.volume_setup import PLAIN, TABLE, make_plain, make_table
+from autostereo.engines.cpu.volume_setup import PLAIN, TABLE, is_sharp, make_plain, make_table, prepare_field
 from autostereo.scene import samples
 from test_cpu_volume_basics import psnr
 
@@ -117,7 +117,7 @@ def test_what_lies_between_sampled_positions_is_as_if_it_were_sampled(
 
     def views(plain: int | None) -> np.ndarray:
         if plain is not None:
-            monkeypatch.setattr(volume, "make_plain", lambda table: np.full(TABLE**2, plain, np.uint8))
+            monkeypatch.setattr(volume_cut, "make_plain", lambda table: np.full(TABLE**2, plain, np.uint8))
         return aus.render_views(SCENES[name], rig, (96, 64), engine="cpu").color.astype(int)
 
     found, sampled, careless = views(None), views(0), views(1)
@@ -125,3 +125,62 @@ def test_what_lies_between_sampled_positions_is_as_if_it_were_sampled(
     assert not np.array_equal(careless, sampled)  # some are interpolated at all
     if name == "sheet of narrow voxels":  # which would be missed, were the transfer function not looked at
         assert np.abs(careless - sampled).max() > 100
+
+
+# --- sharp edges -----------------------------------------------------------------------------------------------------
+
+
+def ball(opacity: float, edge: int = 48) -> aus.Volume:
+    """All within 0.8 shows, nothing beyond."""
+    x = np.linspace(-1, 1, edge)
+    radius = np.sqrt(x[:, None, None] ** 2 + x[:, None] ** 2 + x**2).astype(np.float32)
+    shown = [(0, 1, 0.3, 0.1, opacity), (0.8, 1, 0.3, 0.1, opacity), (0.8, 0, 0, 0, 0), (1.8, 0, 0, 0, 0)]
+    return aus.Volume(radius, (2 / (edge - 1),) * 3, (-1, -1, -1), transfer=aus.TransferFunction(shown), shade=False)
+
+
+OPAQUE = aus.TransferFunction([(0, 1, 1, 1, 100), (1, 0.9, 0.3, 0.1, 100)])
+STEP = aus.TransferFunction([(0, 0, 0, 0, 0), (100, 0, 0, 0, 0), (100, 1, 0.7, 0.3, 30), (255, 1, 0.7, 0.3, 30)])
+SHARP = {
+    "thin ball": ball(10),
+    "ball": ball(30),
+    "opaque ball": ball(300),
+    "step in shells": replace(samples.shells(64), transfer=STEP),
+    "box": aus.Volume(np.ones((9, 9, 9)), (0.2,) * 3, (-0.8,) * 3, transfer=OPAQUE, shade=False),
+    "cut": replace(
+        samples.shells(48),
+        transfer=aus.TransferFunction([(0, 0, 0, 0, 0), (80, 1, 1, 0, 0), (250, 1, 0, 1, 90)]),
+        clip_plane=(0.3, 0.2, -1, 0),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SHARP)
+def test_edges_are_as_sharp_as_those_of_rays_of_their_own(name: str) -> None:
+    """In the outermost views too, beside which the middle one shows by how far they would be blurred."""
+    scene, rig = SHARP[name], CLOSE.with_views(9)
+    assert is_sharp(prepare_field(scene, False))
+    exact = aus.Options(volume="exact", shading="center")
+    found = aus.render_views(scene, rig, (160, 120), engine="cpu").color
+    expected = aus.render_views(scene, rig, (160, 120), engine="cpu", options=exact).color
+    for k in (0, 4, 8):
+        assert psnr(found[k], expected[k]) >= 50
+    assert psnr(np.roll(found, 1, axis=2), expected) < 35
+    for display in DISPLAYS.values():
+        own = rig.with_views(display.views)
+        panels = [aus.render(scene, display, own, engine="cpu", options=o).pixels for o in (aus.Options(), exact)]
+        assert psnr(*panels) >= 50
+
+
+@pytest.mark.parametrize("name", ["shells", "engine_part", "hydrogen_orbital", "c60_density"])
+def test_most_volumes_have_no_sharp_edges(name: str) -> None:
+    assert not is_sharp(prepare_field(getattr(samples, name)(), False))
+
+
+def test_edges_are_drawn_over_what_is_behind_them() -> None:
+    """Volumes of the greatest value come after those that compose, an isosurface before: then all rays are exact."""
+    behind = replace(samples.shells(32), mode="mip")
+    scene = aus.Scene((ball(30), behind), background=(0.2, 0.5, 0.9))
+    exact = aus.Options(volume="exact", shading="center")
+    found = aus.render_views(scene, CLOSE.with_views(5), (160, 120), engine="cpu").color
+    expected = aus.render_views(scene, CLOSE.with_views(5), (160, 120), engine="cpu", options=exact).color
+    assert psnr(found, expected) >= 50

@@ -18,7 +18,8 @@ from .memory import Memory
 from .mesh import PreparedMeshes, draw_mesh_panel, draw_mesh_views, prepare_meshes
 from .points import PointArrays, draw_points_panel, draw_points_views, prepare_points
 from .scene_arrays import background_word
-from .volume import PreparedVolumes, draw_volume_panel, draw_volume_views, prepare_volumes, update_volumes
+from .volume import draw_volume_panel, draw_volume_views
+from .volume_cut import PreparedVolumes, prepare_volumes, update_volumes
 
 
 @dataclass(eq=False)

@@ -1,20 +1,16 @@
-"""Volumes on the cpu engine: from prepared fields to kernels, over what is drawn already."""
+"""Volumes on the cpu engine: which kernels draw them, over what is drawn already."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scene.scene import Scene
-from ...scene.transfer import TransferFunction
-from ...scene.volume import Volume
 from ..engine import Camera, Draw
-from ..options import Options
-from ..volumes import Slices, half_spaces, make_slices
+from ..volumes import Slices, make_slices
 from .gather import map_args
 from .kernels import is_joined, is_woven
 from .memory import Memory
@@ -22,184 +18,29 @@ from .mesh import panel_lines
 from .mesh_panel import Panel
 from .mesh_setup import camera_numbers
 from .panel_lines import LinePlan
-from .scene_arrays import light_array
 from .threads import run_rows
-from .volume_modes import LEVELS
+from .volume_cut import (
+    PreparedVolumes,
+    is_shared,
+    make_cut,
+    new_planes,
+    new_rays,
+    pixel_of,
+    samples_of,
+    volume_groups,
+)
+from .volume_edges import draw_edges
 from .volume_panel import PIXEL_ROWS, draw_panel_rays, draw_panel_rows
 from .volume_plan import SLIDE, can_share, plan_bundles, share_slices, shared_reach
 from .volume_rays import BLOCK_ROWS, RAYS, ROW
-from .volume_sample import CHUNK, LIST, LIST_ROWS, SLABS, Cut, Planes
-from .volume_setup import (
-    BLOCK,
-    TABLE,
-    Field,
-    make_plain,
-    make_table,
-    prepare_field,
-    shown_blocks,
-)
+from .volume_sample import SLABS, Cut
+from .volume_setup import is_sharp
 from .volume_shared import LINE, SLAB_ROWS, SPAN, Shared
-from .volume_views import ISO, MIP, Ways, draw_rows, draw_shared_rows, draw_woven_rows
+from .volume_views import Ways, draw_rows, draw_shared_rows, draw_woven_rows
 
-MODES = ("composite", "mip", "iso")  # in the order of volume_views
-RUN_STEP = 0.5  # voxels, a sixteenth of a run
 SHARED_BLOCKS = 3  # of rays: sampled ones, what lies between, and those of it that are sampled, too
 WIDEST_PAIR = 1.25  # voxels between sampled positions, up to which what lies between is interpolated
 FINE_VIEWS = (1, 8, 3)  # positions of a shared slab: least and most per pixel, and per voxel between them
-
-
-@dataclass(frozen=True, eq=False)
-class PreparedVolumes:
-    """The volumes of a scene, ready to be drawn."""
-
-    scene: Scene
-    fields: list[Field]
-
-    @property
-    def volumes(self) -> list[Volume]:
-        """The volumes themselves."""
-        return [f.volume for f in self.fields]
-
-
-def prepare_volumes(scene: Scene, volumes: list[Volume]) -> PreparedVolumes:
-    """Prepare all volumes of a scene, of one type if they are several."""
-    return PreparedVolumes(scene, [prepare_field(volume, len(volumes) > 1) for volume in volumes])
-
-
-def update_volumes(prepared: PreparedVolumes, scene: Scene, volumes: list[Volume]) -> PreparedVolumes:
-    """The same volumes under other transforms and transfer functions: scalars and gradients stay as they are."""
-    pairs = zip(prepared.fields, volumes, strict=True)
-    return PreparedVolumes(scene, [field._replace(volume=volume) for field, volume in pairs])
-
-
-def table_range(volume: Volume) -> tuple[float, float]:
-    """Scalars between which a volume is classified; beyond the ends of a transfer function nothing changes."""
-    low, high = volume.value_range
-    points = volume.transfer.points[:, 0]
-    if volume.mode != "composite":
-        return low, high
-    margin = 0.5 * float(points[-1] - points[0])  # for slabs that lead beyond an end
-    first, last = max(low, float(points[0]) - margin), min(high, float(points[-1]) + margin)
-    return (first, last) if first < last else (low, high)
-
-
-def gradient_turn(camera: Camera, volume: Volume) -> NDArray[np.float32]:
-    """Matrix (3, 3) that turns gradients from object to eye space, of about length 1."""
-    turn = camera.eye_from_world[:3, :3] @ np.linalg.inv(volume.transform[:3, :3]).T
-    return (turn / np.abs(turn).max()).astype(np.float32)
-
-
-def tables(transfer: TransferFunction, low: float, high: float, length: float) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Slabs of a length (make_table), and between which of them the transfer function is plain (make_plain)."""
-    table = make_table(transfer, low, high, length)
-    return table, make_plain(table)
-
-
-def make_cut(prepared: PreparedVolumes, index: int, draw: Draw, slices: Slices, memory: Memory) -> tuple[Cut, Ways]:
-    """How volume `index` is cut, lit and classified in this frame."""
-    f, camera = prepared.fields[index], draw.camera
-    volume = f.volume
-    index_from_eye = np.linalg.inv(camera.eye_from_world @ volume.world_from_index)
-    along = float(np.abs(index_from_eye[:3, 0]).max())  # voxels per unit of X
-    step = RUN_STEP / along
-    x = (camera.eye_from_world @ np.column_stack([volume.corners, np.ones(8)]).T)[0]
-    first = float(x.min()) - 2.0 * step
-    reach = int(np.ceil((8 * step * along + 1 + slices.distance * np.abs(index_from_eye[:3, 2]).max()) / (1 << BLOCK)))
-    shown = memory.remember(("shown", index), (reach, volume), lambda: shown_blocks(f, reach))
-    low, high = table_range(volume)
-    table, plain = memory.remember(
-        ("table", index),
-        (volume, slices.distance),
-        lambda: tables(volume.transfer, low, high, slices.distance),
-    )
-    low, high = (low - f.first_value) / f.value_step, (high - f.first_value) / f.value_step
-    lights, m = light_array(prepared.scene, camera), volume.material
-    channels, light_colors = 0, 0
-    if f.grid.words.size:
-        light_colors = 3 if np.ptp(lights[:, 4:7], axis=1).any() else 1
-        channels = light_colors * (2 if m.specular > 0 else 1)
-    cut = Cut(
-        f.grid.scalars,
-        f.grid.words,
-        f.grid.shape,
-        np.ascontiguousarray(index_from_eye[:3]),
-        half_spaces(volume),
-        shown,
-        first,
-        step,
-        low,
-        (TABLE - 1.0) / (high - low if high > low else 1.0),
-        gradient_turn(camera, volume),
-        lights,
-        channels,
-        light_colors,
-        (1.0 - m.ambient) / max(m.diffuse, 1e-6),
-        float(m.shininess),
-        camera.offset_y,
-        volume.gradient == "sobel",
-    )
-    mode = MODES.index(volume.mode)
-    colors, level = np.zeros((1, 4), np.float32), 0.0
-    if mode == MIP:
-        colors = volume.transfer.evaluate(np.linspace(*volume.value_range, LEVELS)).astype(np.float32)
-        colors[:, 3] /= max(volume.transfer.max_opacity, 1e-30)
-    elif mode == ISO:
-        assert volume.iso is not None
-        colors[0] = volume.transfer.evaluate(volume.iso)
-        level = ((volume.iso - f.first_value) / f.value_step - low) * cut.scale
-    own_eyes = draw.options.shading != "center" and (mode == ISO or draw.options.volume == "exact")
-    light = (channels, light_colors)
-    return cut, Ways(
-        mode,
-        table,
-        plain,
-        (m.ambient, m.diffuse, m.specular),
-        light,
-        np.ascontiguousarray(colors),
-        level,
-        volume.shade,
-        own_eyes,
-    )
-
-
-def samples_of(prepared: PreparedVolumes, index: int, camera: Camera, cut: Cut) -> int:
-    """Steps across a slice, in whole runs."""
-    x = (camera.eye_from_world @ np.column_stack([prepared.fields[index].volume.corners, np.ones(8)]).T)[0]
-    return (int((float(x.max()) - cut.first) / cut.step) + 4 + (1 << CHUNK)) >> CHUNK << CHUNK
-
-
-def new_planes(samples: int, slices: Slices) -> Planes:
-    """One thread's memory for slices."""
-    runs = samples >> CHUNK
-    return Planes(
-        np.zeros((slices.slabs + 1, runs), np.uint8),
-        np.zeros(runs, np.uint8),
-        np.zeros(LIST, np.int32),
-        np.zeros(LIST, np.int64),
-        np.zeros(8 * LIST, np.int32),
-        np.zeros(LIST_ROWS * LIST, np.float32),
-    )
-
-
-def volume_groups(prepared: PreparedVolumes, opaque: bool) -> list[list[int]]:
-    """Which volumes are drawn together: each isosurface, or all that compose and each of the greatest values."""
-    modes = [v.mode for v in prepared.volumes]
-    if opaque:
-        return [[k] for k, mode in enumerate(modes) if mode == "iso"]
-    composite = [k for k, mode in enumerate(modes) if mode == "composite"]
-    return ([composite] if composite else []) + [[k] for k, mode in enumerate(modes) if mode == "mip"]
-
-
-def new_rays(counts: list[int], slices: Slices) -> tuple[Any, ...]:
-    """One thread's memory for rays of their own: planes of each volume, a block of rays."""
-    planes = tuple(new_planes(n, slices) for n in counts)
-    return planes, np.zeros(BLOCK_ROWS * ROW, np.float32), np.zeros(ROW, np.int32)
-
-
-def is_shared(prepared: PreparedVolumes, group: list[int], options: Options) -> bool:
-    """Whether the slabs of a group are shared by all views: one volume that composes, if the options allow."""
-    alone = len(group) == 1 and prepared.volumes[group[0]].mode == "composite"
-    return alone and options.volume == "shared"
 
 
 def draw_volume_views(
@@ -244,11 +85,6 @@ def draw_volume_views(
             np.minimum(depth, nearest, out=depth)
 
 
-def pixel_of(cut: Cut, camera: Camera, slices: Slices) -> float:
-    """Width of the nearest pixel, in voxels."""
-    return float(slices.first / camera.fx * np.abs(cut.from_eye[:, 0]).max())
-
-
 def new_shared(camera: Camera, slices: Slices, offsets: NDArray[np.float64], fine: int, pixel: float) -> Shared:
     """One thread's memory for shared slabs that reach as far as the views see."""
     begin, count = shared_reach(camera, slices, offsets)
@@ -258,6 +94,26 @@ def new_shared(camera: Camera, slices: Slices, offsets: NDArray[np.float64], fin
     places, parts = np.zeros((SLABS, 3), np.int64), np.zeros(SLABS, np.float32)
     front, back, picked = (np.zeros(ROW, np.int32) for _ in range(3))
     return Shared(begin, fine, paired, count, values, shown, places, parts, front, back, picked)
+
+
+def edge_task(
+    cut: Cut, ways: Ways, samples: int, draw: Draw, slices: Slices, color: NDArray[np.uint8], memory: Memory
+) -> Callable[[int, int, NDArray[np.uint8]], None]:
+    """A task (first row, end, what was there before) that draws edges of a volume in views color (V, H, W, 4) again."""
+    views, _, width, _ = color.shape
+
+    def make() -> Any:
+        planes, rays, packed = new_rays([samples], slices)
+        return planes, (rays, packed, np.zeros(width + 1, np.uint8), np.zeros(views * width + 1, np.int32))
+
+    pool = memory.pool(("volume edges", samples, slices.slabs, views, width), make)
+    numbers = camera_numbers(draw.camera)
+
+    def task(first: int, end: int, behind: NDArray[np.uint8]) -> None:
+        with pool as (planes, scratch):
+            draw_edges((first, end), (cut,), numbers, slices, (ways,), draw.offsets, planes, scratch, behind, color)
+
+    return task
 
 
 def _draw_shared(
@@ -296,11 +152,18 @@ def _draw_shared(
         ),
     )
 
+    edges = None
+    if draw.viewmap is None and is_sharp(prepared.fields[index]):
+        edges = edge_task(cut, ways, samples, draw, slices, color, memory)
+
     def task(first: int, end: int) -> None:
         with pool as (planes, slabs, rays, packed, line, scratch):
             args = (cut, numbers, slices, ways, offsets, groups, planes, slabs, rays, packed, line)
             if draw.viewmap is None:
+                behind = None if edges is None else color[:, first:end].copy()
                 draw_shared_rows((first, end), *args, color)
+                if edges is not None and behind is not None:
+                    edges(first, end, behind)
             else:
                 weave = (map_args(draw.viewmap), draw.flip_x, draw.flip_y, *scratch)
                 draw_woven_rows((first, end), *args, weave, color)
@@ -332,6 +195,7 @@ def draw_volume_panel(
     woven = is_woven(draw.viewmap, options)
     for group in volume_groups(prepared, opaque):
         shared = may_share and is_shared(prepared, group, options)
+        shared = shared and not is_sharp(prepared.fields[group[0]])
         if shared and woven:
             _draw_shared(prepared, group[0], draw, slices, color, memory)
             continue

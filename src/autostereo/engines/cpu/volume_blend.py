@@ -152,21 +152,16 @@ def blend_group(offsets, width, camera, slices, first, last, size, shared, bundl
 
     size: slabs in a bundle; if 1, the slabs themselves are added.
     """
-    count = -(-(last - first) // size)
+    count, slabs = -(-(last - first) // size), shared
     if size > 1:
         make_bundles(offsets, width, camera, slices, first, last, size, shared, bundles)
+        slabs = bundles
     for v in range(len(offsets)):
         for b in range(count):
             begin, end = first + b * size, min(first + (b + 1) * size, last)
-            at = (-offsets[v] * middle_shift(camera, slices, begin, end) - shared.begin) * shared.fine
-            if size > 1:
-                place_slab(b, at, bundles)
-            else:
-                place_slab(b, at, shared)
-        if size > 1:
-            blend_view(width, count, bundles, t + v * SLAB_ROWS * LINE, line)
-        else:
-            blend_view(width, count, shared, t + v * SLAB_ROWS * LINE, line)
+            at = (-offsets[v] * middle_shift(camera, slices, begin, end) - slabs.begin) * slabs.fine
+            place_slab(b, at, slabs)
+        blend_view(width, count, slabs, t + v * SLAB_ROWS * LINE, line)
 
 
 @inlined

@@ -53,9 +53,7 @@ def march_mip(n, base, cut, row, slices, first, last, planes, rays):
     bounds, fresh = block_bounds(n, base, rays), False
     for k in range(first, last):
         depth = slices.first + k * slices.distance
-        if not (
-            seen(bounds, depth, cut, planes.marks, k) or seen(bounds, depth + slices.distance, cut, planes.marks, k + 1)
-        ):
+        if not seen(bounds, cut, slices, k, planes.marks):
             fresh = False
             continue
         sample_ends(n, base, k, fresh, cut, row, slices, planes, rays)
@@ -97,9 +95,7 @@ def march_iso(n, base, cut, row, slices, first, last, level, planes, rays):
     bounds, fresh, iso = block_bounds(n, base, rays), False, np.float32(level)
     for k in range(first, last):
         depth = slices.first + k * slices.distance
-        if not (
-            seen(bounds, depth, cut, planes.marks, k) or seen(bounds, depth + slices.distance, cut, planes.marks, k + 1)
-        ):
+        if not seen(bounds, cut, slices, k, planes.marks):
             fresh = False
             continue
         sample_ends(n, base, k, fresh, cut, row, slices, planes, rays)

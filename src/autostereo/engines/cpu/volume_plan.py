@@ -9,10 +9,10 @@ from ..engine import Camera
 from ..volumes import MAX_PLANES, Slices
 from .volume_shared import MAX_LENGTH, PAIRS
 
-STEEPEST = 1.0  # greatest offset of a camera over the nearest depth, up to which views may share slabs
+STEEPEST = 0.5  # greatest offset of a camera over the nearest depth, up to which views may share slabs
 BUNDLES = (2, 4, 8)  # slabs blended once for a group of views; whole parts of SLABS
 SLIP = (0.25, 0.1)  # most pixels, and voxels, by which slabs of a bundle are off in a view
-SLIDE = (1.0, 2.0)  # most pixels by which a shared slab's front and back part, in views and, coarser by nature, panels
+SLIDE = (1.0, 2.0)  # pixels by which front and back of a shared slab slide apart, at most; panels are coarser by nature
 
 
 def share_slices(slices: Slices, camera: Camera, offsets: NDArray[np.float64], most: float) -> Slices:

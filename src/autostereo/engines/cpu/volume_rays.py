@@ -267,7 +267,7 @@ def block_bounds(n, base, rays):
 
 
 @inlined
-def seen(bounds, depth, cut, marks, k):
+def slice_seen(bounds, depth, cut, marks, k):
     """Whether rays within block_bounds pass near marked samples of slice k."""
     low, high, least, most = bounds
     inverse, count = 1.0 / cut.step, np.float64(1 << 24)
@@ -277,12 +277,10 @@ def seen(bounds, depth, cut, marks, k):
 
 
 @inlined
-def is_seen(n, base, cut, slices, k, planes, rays):
-    """Whether a block of rays may meet something in slab k of a volume."""
-    bounds, depth = block_bounds(n, base, rays), slices.first + k * slices.distance
-    return seen(bounds, depth, cut, planes.marks, k) or seen(
-        bounds, depth + slices.distance, cut, planes.marks, k + 1
-    )
+def seen(bounds, cut, slices, k, marks):
+    """Whether rays within block_bounds may meet something in slab k."""
+    depth = slices.first + k * slices.distance
+    return slice_seen(bounds, depth, cut, marks, k) or slice_seen(bounds, depth + slices.distance, cut, marks, k + 1)
 
 
 @lean
@@ -328,7 +326,7 @@ def march(n, base, cut, row, slices, first, last, way, wants_half, among, planes
             return
         depth = slices.first + k * slices.distance
         after = depth + slices.distance
-        if not (seen(bounds, depth, cut, planes.marks, k) or seen(bounds, after, cut, planes.marks, k + 1)):
+        if not seen(bounds, cut, slices, k, planes.marks):
             fresh = False
             continue
         if not fresh:

@@ -20,6 +20,9 @@ from .threads import run_rows
 
 BLOCK = 2  # log2 of the edge of a block, in voxels
 PLAIN = 1 / 512  # of full colour or opacity: what is plain enough between two scalars
+SHARP = 0.1  # of full colour or opacity: a jump that makes edges
+OPAQUE_CUT = 0.5  # opacity of a voxel that makes edges where a volume ends or is clipped
+FEW_PIXELS = 128  # across a volume: the length of wider voxels, for this purpose
 TABLE = 256  # scalars of the pre-integration table
 SOUNDINGS = 65_521  # voxels whose gradients are measured, to know how steep they are
 STEEP = 99.9  # percentile of those that differ from zero: steeper gradients keep their direction only
@@ -40,13 +43,17 @@ class Grid(NamedTuple):
 
 
 class Field(NamedTuple):
-    """A prepared volume: what it is, its grid, (2, …) block ranges, the value of stored scalar 0 and of one step."""
+    """A prepared volume: what it is, its grid, (2, …) block ranges, the value of stored scalar 0 and of one step.
+
+    faces: least and greatest value on the six faces of the box.
+    """
 
     volume: Volume
     grid: Grid
     blocks: NDArray[np.float32]
     first_value: float
     value_step: float
+    faces: tuple[float, float]
 
 
 @kernel
@@ -186,10 +193,37 @@ def prepare_field(volume: Volume, wide: bool) -> Field:
         args = (scalars, shape, volume.gradient == "sobel", matrix, steepest)
         run_rows(volume.values.shape[0], lambda first, last: store_gradients(*args, first, last, words), 2)
     grid = Grid(scalars, words, shape, (low - first_value) / value_step, (high - first_value) / value_step)
-    return Field(volume, grid, blocks, first_value, value_step)
+    faces = [np.take(values, k, axis) for axis in range(3) for k in (0, -1)]
+    ends = (min(float(face.min()) for face in faces), max(float(face.max()) for face in faces))
+    return Field(volume, grid, blocks, first_value, value_step, ends)
 
 
 # --- classification ------------------------------------------------------------------------------------------------
+
+
+def table_range(volume: Volume) -> tuple[float, float]:
+    """Scalars between which a volume is classified; beyond the ends of a transfer function nothing changes."""
+    low, high = volume.value_range
+    points = volume.transfer.points[:, 0]
+    if volume.mode != "composite":
+        return low, high
+    margin = 0.5 * float(points[-1] - points[0])  # for slabs that lead beyond an end
+    first, last = max(low, float(points[0]) - margin), min(high, float(points[-1]) + margin)
+    return (first, last) if first < last else (low, high)
+
+
+def is_sharp(field: Field) -> bool:
+    """Whether pictures have sharp edges: voxels jump from a scalar to the next but one, or are cut where opaque."""
+    volume, (low, high) = field.volume, field.faces
+    if volume.clip_box is not None or volume.clip_plane is not None:
+        low, high = volume.value_range
+    scalars = np.linspace(*table_range(volume), TABLE)
+    rgba = volume.transfer.evaluate(np.append(scalars, (low, high)))
+    length = min(volume.voxel_size.min(), (volume.voxel_size * (np.array(volume.shape) - 1)).max() / FEW_PIXELS)
+    opacity = -np.expm1(-rgba[:, 3:] * length)
+    cut = opacity[np.append((scalars >= low) & (scalars <= high), (True, True))].max()
+    shown = np.hstack([opacity, opacity * rgba[:, :3]])[:TABLE]
+    return bool(cut > OPAQUE_CUT or np.abs(shown[2:] - shown[:-2]).max() > SHARP)
 
 
 def make_table(transfer: TransferFunction, low: float, high: float, length: float) -> NDArray[np.int64]:

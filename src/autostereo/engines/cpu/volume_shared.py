@@ -277,9 +277,7 @@ def classify_pairs(cut, camera, row, slices, first, last, look, plain, planes, s
             slab = (k - first) * shared.fine
             place = np.uint64(slab * SLAB_ROWS * LINE + g * PAIRS * 2 // shared.fine)
             beside = place + np.uint64(SLAB_ROWS * LINE)
-            if not (
-                seen(bounds, depth, cut, planes.marks, k) or seen(bounds, depth + distance, cut, planes.marks, k + 1)
-            ):
+            if not seen(bounds, cut, slices, k, planes.marks):
                 fresh = False
                 if shared.fine == 1:
                     clear_block(n + n, place, shared.values)
@@ -326,10 +324,7 @@ def classify_all(cut, camera, row, slices, first, last, look, planes, shared, ra
             for k in range(first, last):
                 depth = slices.first + k * distance
                 place = np.uint64(((k - first) * shared.fine + phase) * SLAB_ROWS * LINE + g * RAYS)
-                if not (
-                    seen(bounds, depth, cut, planes.marks, k)
-                    or seen(bounds, depth + distance, cut, planes.marks, k + 1)
-                ):
+                if not seen(bounds, cut, slices, k, planes.marks):
                     fresh = False
                     clear_block(n, place, shared.values)
                     continue

@@ -30,9 +30,10 @@ from .volume_rays import (
     R,
     T,
     add_optical,
-    is_seen,
+    block_bounds,
     march,
     ray_stretch,
+    seen,
 )
 from .volume_sample import SLABS, TINY, hide_runs, keep_alive, mark_runs
 from .volume_shared import ALPHA, LINE, SLAB_ROWS, classify_slabs
@@ -66,16 +67,16 @@ class Ways(NamedTuple):
 @inlined
 def add_totals(n, base, cuts, row, slices, ways, k, planes, rays, packed):
     """Optical depth of slab k of all volumes into TOTAL; returns whether several are seen there."""
-    together = 0
+    bounds, together = block_bounds(n, base, rays), 0
     for v in range(len(cuts)):
-        together += is_seen(n, base, cuts[v], slices, k, planes[v], rays)
+        together += seen(bounds, cuts[v], slices, k, planes[v].marks)
     if together < 2:
         return False
     for i in range(n):
         rays[base + TOTAL + i] = ZERO
         rays[base + DONE + i] = ZERO
     for v in range(len(cuts)):
-        if is_seen(n, base, cuts[v], slices, k, planes[v], rays):
+        if seen(bounds, cuts[v], slices, k, planes[v].marks):
             ray_stretch(n, base, cuts[v], row, slices.first, rays)
             add_optical(n, base, cuts[v], row, slices, k, ways[v], planes[v], rays, packed)
     return True
