@@ -157,7 +157,7 @@ def test_one_pass_is_n_passes(scene, display):
 
 @pytest.mark.parametrize("scene", ["composite", "lights"])
 def test_shared_lookups_stay_near_the_exact_rays(scene):
-    """Lookups at most a quarter of a voxel beside a ray, on 20³ and 14³ voxels with steep transfer functions."""
+    """Lookups at most three quarters of a voxel beside a ray, on 20³ and 14³ voxels with steep transfer functions."""
     one, many = (panel(scene, "wavelength-selective", method) for method in ("single-pass", "n-pass"))
     assert psnr(one, many) >= 38
     assert (one != many).any(), "nothing was shared"
@@ -175,11 +175,26 @@ def test_what_is_shared_is_bounded_by_its_distance(monkeypatch):
     exact = exact.pixels.astype(int)
     found = {}
     for near in (0.125, 0.25, 0.5):
-        monkeypatch.setattr(stage, "NEAR", near)
+        monkeypatch.setattr(stage, "NEAR_UNLIT", near)
         shared = aus.render(scene, DISPLAYS["wavelength-selective"], rig, engine="gl").pixels
         found[near] = np.abs(shared - exact).max()
         assert found[near] <= 255 / 23 * near + 1
     assert found[0.5] > found[0.125]
+
+
+def test_what_is_shared_follows_the_gradient(monkeypatch):
+    """The same with light, from lookups up to four voxels beside: where scalars are linear nothing is off."""
+    from autostereo.engines.gl import volume as stage
+
+    ramp = linear((1, 0, 0), 0, (12, 12, 24), transfer=aus.TransferFunction([(0, 0, 0, 0, 4), (23, 1, 1, 1, 4)]))
+    ramp = replace(ramp, **centred((0.1,) * 3, (12, 12, 24)))
+    scene, rig = aus.Scene(ramp), aus.Rig(position=(0, 0, 0), target=(0, 0, -4), fov_y=30, baseline=1.0, views=V)
+    need_device()
+    panels = []
+    for near in (-1.0, 4.0):
+        monkeypatch.setattr(stage, "NEAR", near)
+        panels.append(aus.render(scene, DISPLAYS["wavelength-selective"], rig, engine="gl").pixels.astype(int))
+    assert np.abs(panels[1] - panels[0]).max() <= 2 and (panels[1] != panels[0]).any()
 
 
 # --- closed forms ----------------------------------------------------------------------------------------------------

@@ -5,10 +5,12 @@ The methods of Hübner 2007a: `n-pass` and its kin follow a ray per pixel of eve
 march in the fragment shader (volume.frag), or slices are blended (`Options.proxy`, volume_slices.py).
 
 What the three rays of a pixel share: the search for what is empty, and the end of the march; with `volume="shared"`,
-where they pass within 2·NEAR voxels of each other, lookups too: what a ray is told then is the volume at most NEAR
-voxels beside it, so a scalar is off by no more than NEAR·|∂s/∂x| (per voxel). Displays that show one view in all of
-a pixel need one ray a pixel. With `volume="exact"` only equal rays share, and slabs are lit in their middle, not
-by the mean of the light at their ends.
+where they pass within 2·NEAR voxels of each other, lookups and their light, too. A ray's scalar is then that of a
+lookup at most NEAR voxels beside it, carried on along the gradient g that is looked up with it (Taylor's first
+order): it is off by no more than NEAR·max|∂s/∂x − g|, not at all where scalars are linear. Without light there is no
+gradient; rays share within 2·NEAR_UNLIT voxels, and are off by NEAR_UNLIT·|∂s/∂x|. Each ray has its own
+classification. Displays that show one view in all of a pixel need one ray a pixel. With `volume="exact"` only equal
+rays share, and slabs are lit in their middle, not by the mean of the light at their ends.
 
 Order of a scene: isosurfaces are opaque and come before points; then volumes that compose, together; then those of the
 greatest value one by one (engines/reference/picture.py).
@@ -40,7 +42,7 @@ from .volume_slices import slices_on_panel, slices_on_tiles
 from .volume_space import most_half_spaces, placing, put, put_units
 
 TOGETHER = 4  # volumes that compose in one march: each takes three of the 16 texture units that there are at least
-NEAR = 0.25  # voxels that a shared lookup may be beside a ray
+NEAR, NEAR_UNLIT = 0.75, 0.25  # voxels that a shared lookup may be beside a ray
 LENGTHS = 8  # lengths of slabs per doubling, for which tables are made
 SHADERS = {
     "composite": ("volume.vert", "volume.frag"),
@@ -124,7 +126,7 @@ class Rays(Stage):
             **self._switches(job, group),
             "COARSE": self._coarse,
             "PANEL": on_panel,
-            "LANES": 1 if not on_panel or one_ray(job) else 3,
+            "LANES": lanes(job),
             "OPAQUE": beneath is not None and has_opaque(job),
             "COVERED": beneath is not None,
             "AVERAGED": on_panel and job.draw.options.alpha == "averaged",
@@ -167,7 +169,8 @@ class Rays(Stage):
         count = range(len(group))
         put_units(program, voxels=[VOXELS + k for k in count], emptiness=[EMPTY + k for k in count])
         shared = job.draw.options.volume == "shared" and group[0].mode == "composite"
-        put(program, slices=(slices.first, slices.distance, slices.slabs), share_within=NEAR if shared else -1.0)
+        near = NEAR if any(is_shaded(v) for v in group) else NEAR_UNLIT
+        put(program, slices=(slices.first, slices.distance, slices.slabs), share_within=near if shared else -1.0)
         put(program, **placing(group, job.draw.camera))
         materials = [v.material for v in group]
         lit = [(m.ambient, m.diffuse, m.specular, m.shininess) for m in materials]
@@ -192,8 +195,8 @@ class Rays(Stage):
         """Tables of pre-integrated slabs: made again for another transfer function or quite another length."""
         step = round(LENGTHS * np.log2(slices.distance))
         for k, volume in enumerate(group):
-            make = partial(make_table, job.device, volume, 2.0 ** (step / LENGTHS))
-            table = job.kept.get(("slab table", k), (volume.transfer, step), make)
+            make = partial(make_table, job.device, volume, 2.0 ** (step / LENGTHS), lanes(job) == 3)
+            table = job.kept.get(("slab table", k, lanes(job)), (volume.transfer, step), make)
             table.use(TABLES + k)
         put_units(program, slab_table=[TABLES + k for k in range(len(group))])
         put(program, table_place=[place_in(table_range(v), v.value_range, TABLE) for v in group])
@@ -221,10 +224,12 @@ def by_slices(job: Job, group: list[Volume]) -> bool:
     return options.proxy == "slices" and group[0].mode == "composite" and not options.depth
 
 
-def one_ray(job: Job) -> bool:
-    """Whether all sub-pixels of a pixel are on one ray."""
-    assert job.mask is not None and job.columns is not None
-    return one_view(job.mask.viewmap) and len(set(job.columns)) == 1
+def lanes(job: Job) -> int:
+    """How many rays a fragment follows: one, or those of a pixel's three sub-pixels."""
+    if job.columns is None:
+        return 1
+    assert job.mask is not None
+    return 1 if one_view(job.mask.viewmap) and len(set(job.columns)) == 1 else 3
 
 
 def one_view(viewmap: ViewMap) -> bool:

@@ -183,16 +183,19 @@ def place_in(values: tuple[float, float], range_of_scalar: tuple[float, float], 
 
 
 def float_texture(device: Device, data: NDArray[np.float32]) -> Any:
-    """A texture (h, w, 4), linearly interpolated."""
-    texture = device.ctx.texture(data.shape[1::-1], 4, np.ascontiguousarray(data).tobytes(), dtype="f4")
+    """A texture (h, w, channels), linearly interpolated."""
+    texture = device.ctx.texture(data.shape[1::-1], data.shape[2], np.ascontiguousarray(data).tobytes(), dtype="f4")
     texture.filter = (device.ctx.LINEAR, device.ctx.LINEAR)
     texture.repeat_x = texture.repeat_y = False
     return texture
 
 
-def make_table(device: Device, volume: Volume, length: float) -> Any:
-    """The texture of `slab_table`."""
-    return float_texture(device, slab_table(volume, length))
+def make_table(device: Device, volume: Volume, length: float, apart: bool) -> Any:
+    """The texture of `slab_table`; `apart`: its channels one above the other, each with the extinction."""
+    table = slab_table(volume, length)
+    if apart:
+        table = np.concatenate([table[..., [c, 3]] for c in range(3)])
+    return float_texture(device, table)
 
 
 class Look:

@@ -35,11 +35,7 @@ void main() {
             far_end[v] = clamp(LANE(end == 0 ? t : after), enter[v], leave[v]);
         }
         for (int l = 0; l < LANES; ++l) {
-            for (int v = 0; v < VOLUMES; ++v) {
-                vec4 voxel = look_up(v, l, LANES);
-                s_back[v] = with(s_back[v], l, voxel.a);
-                visit(v, l, voxel);
-            }
+            look_up(l);
         }
         alpha = slab_alpha();
         end_slab();

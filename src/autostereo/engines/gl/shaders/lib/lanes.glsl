@@ -11,11 +11,6 @@ bvec3 not_less(vec3 a, vec3 b) { return greaterThanEqual(a, b); }
 float of(vec3 a, int l) { return l == 0 ? a.x : l == 1 ? a.y : a.z; }
 vec3 with(vec3 a, int l, float x) { return mix(a, vec3(x), equal(ivec3(l), ivec3(0, 1, 2))); }
 vec3 choose(bvec3 which, vec3 a, vec3 b) { return mix(b, a, which); }
-
-// What the rounds of a slab did not look up is as lane 0.
-vec3 filled(vec3 a, int rounds) {
-    return vec3(a.x, rounds < 2 ? a.x : a.y, rounds < 3 ? a.x : a.z);
-}
 #else
 #define LANE float
 float least(float a) { return a; }
@@ -27,5 +22,4 @@ bool not_less(float a, float b) { return a >= b; }
 float of(float a, int l) { return a; }
 float with(float a, int l, float x) { return x; }
 float choose(bool which, float a, float b) { return which ? a : b; }
-float filled(float a, int rounds) { return a; }
 #endif

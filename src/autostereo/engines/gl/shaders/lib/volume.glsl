@@ -4,8 +4,8 @@
 //
 // Switches: VOLUMES; HALVES, half-spaces of each.
 //
-// What follows is shaped by llvmpipe, which carries out both sides of an `if` and saves only where loops end early: rays
-// are looked up in a loop of as many rounds as there are different ones, and what is empty is skipped in a loop.
+// What follows is shaped by llvmpipe, which carries out both sides of an `if`, and every loop at least once: rays are
+// looked up in a loop of as many rounds as there are different ones, and what is empty is skipped in a loop.
 
 uniform sampler3D voxels[VOLUMES];        // gradient, 0 at STEPS, 65535 steps in all; scalar 0 ... 1 of its range
 uniform usampler3D emptiness[VOLUMES];    // of blocks of BLOCK^3 cells: how many blocks away, any way, something shows
@@ -26,7 +26,7 @@ bool twins;                               // lanes 0 and 2 are the same ray
 LANE enter[VOLUMES], leave[VOLUMES];
 LANE near_end[VOLUMES], far_end[VOLUMES];
 int slab, slab_end;
-int rounds;                               // lanes that differ in it; the others are as lane 0
+int rounds;                               // lanes that are looked up; the others see from beside what lane 0 finds
 LANE s_front[VOLUMES], s_back[VOLUMES];   // scalars at its ends
 float left;                               // rays are followed while this is more than 0
 
@@ -116,15 +116,24 @@ int lookups(float t) {
 #endif
 }
 
-// The voxel on lane l of volume v at the far end of the slab; `count` lookups serve all lanes.
-vec4 look_up(int v, int l, int count) {
-    float own = of(far_end[v], l);
-    LANE x = origin_x + own * turn_x;
-    float at = of(x, l);
+// Look up the far end of the slab on lane l, first on lane 0, which may stand for others: what those see beside it is
+// found by its gradient, if there is one.
+void look_up(int l) {
+    for (int v = 0; v < VOLUMES; ++v) {
+        float own = of(far_end[v], l);
+        LANE x = origin_x + own * turn_x;
+        float at = of(x, l);
 #if LANES == 3
-    at = count == 1 ? 0.5 * (least(x) + greatest(x)) : count == 2 && l != 1 ? 0.5 * (x.x + x.z) : at;
+        at = rounds == 1 ? 0.5 * (least(x) + greatest(x)) : rounds == 2 && l == 0 ? 0.5 * (x.x + x.z) : at;
 #endif
-    return voxel_at(v, at, own);
+        vec4 voxel = voxel_at(v, at, own);
+        LANE scalar = LANE(voxel.a);
+#if LANES == 3 && defined(SHADED)
+        scalar += dot(gradient_of(voxel), index_from_eye[v][0].xyz) / STEPS * (x - at);
+#endif
+        s_back[v] = l == 0 ? scalar : with(s_back[v], l, of(scalar, l));
+        visit(v, l, voxel);
+    }
 }
 
 // Take the rays through all slabs in which something may show. Where what was before is empty, a slab of no thickness
@@ -134,7 +143,6 @@ void march() {
         return;
     }
     bool fresh = true;
-    int front_count = 1;
     do {
         int skipped;
         do {
@@ -146,27 +154,18 @@ void march() {
         do {
             float t = slices.x + float(slab) * slices.y, after = slices.x + float(slab + 1) * slices.y;
             after = fresh ? t : after;
-            int count = lookups(after);
-            rounds = fresh ? count : max(front_count, count);
+            rounds = lookups(after);
             for (int v = 0; v < VOLUMES; ++v) {
                 near_end[v] = clamp(LANE(t), enter[v], leave[v]);
                 far_end[v] = clamp(LANE(after), enter[v], leave[v]);
             }
             int l = 0;
             do {
-                for (int v = 0; v < VOLUMES; ++v) {
-                    vec4 voxel = look_up(v, l, count);
-                    s_back[v] = with(s_back[v], l, voxel.a);
-                    visit(v, l, voxel);
-                }
+                look_up(l);
                 ++l;
             } while (l < rounds);
-            for (int v = 0; v < VOLUMES; ++v) {
-                s_back[v] = filled(s_back[v], rounds);
-            }
             end_slab();
             s_front = s_back;
-            front_count = count;
             slab += fresh ? 0 : 1;
             fresh = false;
         } while (slab < look_again && left > 0.0);

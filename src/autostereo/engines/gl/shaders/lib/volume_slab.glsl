@@ -3,19 +3,18 @@
 // the price of a lookup, else by the mean of the light at its ends; OWN_EYES: highlights are those of each ray's eye, else of
 // the centre's; HALF_DEPTH.
 //
-// A vec3 is of three lanes, each for its own channel, or of one ray's three channels: SHOWN is what one lane shows.
+// A vec3 is of three lanes, each for its own channel, or of one ray's three channels.
 
-uniform sampler2D slab_table[VOLUMES];   // (front, back): colour times extinction, extinction; bilinear
+uniform sampler2D slab_table[VOLUMES];   // (front, back), bilinear: colour times extinction, extinction; for three lanes the
+                                         // channels one above the other, each with the extinction
 uniform vec2 table_place[VOLUMES];       // scale and offset of a scalar's place in it
 
 #if LANES == 3
-#define SHOWN float
-float shown(vec3 channels, int l) { return dot(channels, pick(l)); }
+#define SLAB vec2                        // what a slab is for one lane: colour times extinction, extinction
 float part(vec3 all, int l) { return of(all, l); }
 vec3 with_part(vec3 all, int l, float x) { return with(all, l, x); }
 #else
-#define SHOWN vec3
-vec3 shown(vec3 channels, int l) { return channels; }
+#define SLAB vec4
 vec3 part(vec3 all, int l) { return all; }
 vec3 with_part(vec3 all, int l, vec3 x) { return x; }
 #endif
@@ -28,83 +27,81 @@ LANE fill_begin, fill_end;               // between which depths it holds anythi
 vec3 lit_front[VOLUMES], lit_back[VOLUMES];        // what light multiplies colours by
 vec3 shine_front[VOLUMES], shine_back[VOLUMES];    // and what it adds
 
-struct Classified {
-    vec4 texel;                          // colour times extinction, extinction
-    vec3 reflected, highlight;
-};
-Classified first[VOLUMES];               // on lane 0, for lanes that are as it is
-
-void begin_slab() {
-    optical = LANE(0.0);
-    glow = vec3(0.0);
-#ifdef HALF_DEPTH
-    fill_begin = LANE(1e30);
-    fill_end = LANE(-1e30);
+SLAB slab_texel(int v, int l) {
+    vec2 place = vec2(of(s_back[v], l), of(s_front[v], l)) * table_place[v].x + table_place[v].y;
+#if LANES == 3
+    int c = l == 0 ? order.x : l == 1 ? order.y : order.z;
+    float edge = 0.5 / float(textureSize(slab_table[v], 0).x);
+    return looked_up(slab_table[v], vec2(place.x, (clamp(place.y, edge, 1.0 - edge) + float(c)) / 3.0)).rg;
+#else
+    return looked_up(slab_table[v], place);
 #endif
 }
 
-Classified classify(int v, int l, vec4 voxel) {
-    Classified c;
-    vec2 place = vec2(voxel.a, of(s_front[v], l)) * table_place[v].x + table_place[v].y;
-    c.texel = looked_up(slab_table[v], place);
+// Light on lane l of volume v; that of lane 0 for all that are not looked up.
+void visit(int v, int l, vec4 voxel) {
 #ifdef SHADED
-    vec3 point = vec3(0.0), eye = vec3(0.0, lens.w, 0.0);
 #ifdef MIDDLE
     float t = 0.5 * (of(near_end[v], l) + of(far_end[v], l));
     voxel = voxel_on_ray(v, l, t);
 #else
     float t = of(far_end[v], l);
 #endif
-    point = eye_point(l, t);
+    vec3 eye = vec3(0.0, lens.w, 0.0), reflected, highlight;
 #ifdef OWN_EYES
     eye.x = of(origin_x, l);
 #endif
-    light_inside(v, gradient_of(voxel), point, eye, c.reflected, c.highlight);
+    light_inside(v, gradient_of(voxel), eye_point(l, t), eye, reflected, highlight);
+    reflected = by_lane(reflected);
+    highlight = by_lane(highlight);
+#if LANES == 3
+    lit_back[v] = l == 0 ? reflected : with(lit_back[v], l, of(reflected, l));
+    shine_back[v] = l == 0 ? highlight : with(shine_back[v], l, of(highlight, l));
+#else
+    lit_back[v] = reflected;
+    shine_back[v] = highlight;
 #endif
-    return c;
+#endif
 }
 
 // Add lane l of volume v. Volumes add their optical depths, and mix their colours by them.
-void add_to_slab(int v, int l, Classified c) {
+void add_to_slab(int v, int l) {
     float length_here = (of(far_end[v], l) - of(near_end[v], l)) * of(ray_length, l);
-    SHOWN own = shown(c.texel.rgb, l);
-#ifdef SHADED
-    SHOWN lit = shown(c.reflected, l), shine = shown(c.highlight, l);
-#ifdef MIDDLE
-    own = own * lit + c.texel.a * shine;
+    SLAB texel = slab_texel(v, l);
+#if LANES == 3
+    float own = texel.x, extinction = texel.y;
 #else
-    own = 0.5 * (own * (part(lit_front[v], l) + lit) + c.texel.a * (part(shine_front[v], l) + shine));
-    lit_back[v] = with_part(lit_back[v], l, lit);
-    shine_back[v] = with_part(shine_back[v], l, shine);
+    vec3 own = texel.rgb;
+    float extinction = texel.a;
+#endif
+#ifdef SHADED
+#ifdef MIDDLE
+    own = own * part(lit_back[v], l) + extinction * part(shine_back[v], l);
+#else
+    own *= 0.5 * (part(lit_front[v], l) + part(lit_back[v], l));
+    own += 0.5 * extinction * (part(shine_front[v], l) + part(shine_back[v], l));
 #endif
 #endif
-    optical = with(optical, l, of(optical, l) + c.texel.a * length_here);
+    optical = with(optical, l, of(optical, l) + extinction * length_here);
     glow = with_part(glow, l, part(glow, l) + own * length_here);
 #ifdef HALF_DEPTH
-    bool fills = c.texel.a * length_here > 0.0;
+    bool fills = extinction * length_here > 0.0;
     fill_begin = with(fill_begin, l, min(of(fill_begin, l), fills ? of(near_end[v], l) : 1e30));
     fill_end = with(fill_end, l, max(of(fill_end, l), fills ? of(far_end[v], l) : -1e30));
 #endif
 }
 
-void visit(int v, int l, vec4 voxel) {
-    if (v == 0 && l == 0) {
-        begin_slab();
-    }
-    Classified c = classify(v, l, voxel);
-    add_to_slab(v, l, c);
-    if (l == 0) {
-        first[v] = c;
-    }
-}
-
-// Opacity of the slab, at its end. Lanes that were not looked up are as the first but for their length.
+// Opacity of the slab, at its end.
 LANE slab_alpha() {
-    for (int l = 1; l < LANES; ++l) {
-        if (rounds < l + 1) {
-            for (int v = 0; v < VOLUMES; ++v) {
-                add_to_slab(v, l, first[v]);
-            }
+    optical = LANE(0.0);
+    glow = vec3(0.0);
+#ifdef HALF_DEPTH
+    fill_begin = LANE(1e30);
+    fill_end = LANE(-1e30);
+#endif
+    for (int v = 0; v < VOLUMES; ++v) {
+        for (int l = 0; l < LANES; ++l) {
+            add_to_slab(v, l);
         }
     }
     lit_front = lit_back;
