@@ -165,6 +165,26 @@ def test_truncated_slice(tmp_path, capfd, share):
     assert capfd.readouterr() == ("", "")
 
 
+def shortened(file, lost=40):
+    """Take pixels away from the end of a file, whose header stays consistent in itself."""
+    data = file.read_bytes()
+    at = data.rindex(b"\xe0\x7f\x10\x00") + 4
+    at += 4 * data[at:].startswith((b"OW", b"OB"))
+    length = int.from_bytes(data[at : at + 4], "little") - lost
+    file.write_bytes(data[:at] + length.to_bytes(4, "little") + data[at + 4 : -lost])
+
+
+def test_fewer_pixels_than_announced(tmp_path):
+    """The missing ones would be whatever lay in memory."""
+    files = write_series(tmp_path)
+    shortened(files[2])
+    refused(tmp_path, f"{files[2].name}: is damaged or truncated: 126 bytes of pixels expected, found 86")
+    path = tmp_path / "a.dcm"
+    sitk.WriteImage(sitk.GetImageFromArray(phantom("uint8")), str(path))
+    shortened(path)
+    refused(path, "a.dcm: is damaged or truncated: 315 bytes of pixels expected, found 276")
+
+
 def test_other_files_in_the_folder_do_not_matter(tmp_path):
     write_series(tmp_path)
     (tmp_path / "README.txt").write_text("hello")

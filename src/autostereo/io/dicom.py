@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import warnings
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from .files import PathLike
 from .volume import NO_HINTS, Hints, check_start, clean, make_volume, silenced, simpleitk
 
 PICTURES = (".tif", ".tiff", ".png")
+NATIVE = ("1.2.840.10008.1.2", "1.2.840.10008.1.2.1", "1.2.840.10008.1.2.2")  # transfer syntaxes that do not compress
 EVEN = 0.05  # gaps between slices may differ by this part of the usual gap
 
 
@@ -126,6 +128,7 @@ def _locate(sitk: Any, file: str) -> _Slice:
         reader.ReadImageInformation()
     except RuntimeError as error:
         raise FileError(f"{file}: is damaged or truncated ({clean(error)})") from None
+    _check_pixels(reader, file)
     direction = np.reshape(reader.GetDirection(), (reader.GetDimension(), -1))[:3, :2]
     instance = reader.GetMetaData("0020|0013").strip() if reader.HasMetaDataKey("0020|0013") else ""
     size, spacing = reader.GetSize(), reader.GetSpacing()
@@ -137,6 +140,23 @@ def _locate(sitk: Any, file: str) -> _Slice:
         (size[0], size[1]),
         int(instance) if re.fullmatch(r"[+-]?\d+", instance) else 0,
     )
+
+
+def _check_pixels(reader: Any, file: str) -> None:
+    """Refuse a file that holds fewer pixels than its header says: GDCM leaves the memory of the others as it is."""
+    keys = ("0028|0010", "0028|0011", "0028|0100", "0028|0002", "0028|0008")  # rows, columns, bits, samples, frames
+    told = [reader.GetMetaData(key).strip() if reader.HasMetaDataKey(key) else "1" for key in keys]
+    data = Path(file).read_bytes()
+    syntax = re.search(rb"\x02\x00\x10\x00UI..([0-9.]+)", data[:4096], re.DOTALL)
+    if not syntax or syntax.group(1).decode() not in NATIVE or not all(re.fullmatch(r"\d+", word) for word in told):
+        return
+    wanted = (math.prod(map(int, told)) + 7) // 8
+    # the element (7FE0,0010), which small pictures (icons) have too: with a type, or without one (the first syntax)
+    little = [int.from_bytes(n, "little") for n in re.findall(rb"\xe0\x7f\x10\x00(?:O[BW]..)?(.{4})", data, re.DOTALL)]
+    big = [int.from_bytes(n, "big") for n in re.findall(rb"\x7f\xe0\x00\x10O[BW]..(.{4})", data, re.DOTALL)]
+    found = max((n for n in little + big if n <= len(data)), default=wanted)
+    if found < wanted:
+        raise FileError(f"{file}: is damaged or truncated: {wanted:,} bytes of pixels expected, found {found:,}")
 
 
 def _sort(slices: list[_Slice], path: Path) -> list[list[_Slice]]:
@@ -186,6 +206,7 @@ def _read_slices(sitk: Any, path: Path, slices: list[_Slice]) -> NDArray:
 def _load_multiframe(sitk: Any, path: Path, file: str, hints: Hints) -> Volume:
     try:
         with silenced(sitk):
+            _locate(sitk, file)
             image = sitk.ReadImage(file, imageIO="GDCMImageIO")
     except RuntimeError as error:
         raise FileError(f"{file}: is not DICOM, damaged or truncated ({clean(error)})") from None
