@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from ..scene.volume import Volume
-from .files import PathLike
-from .volume import NO_HINTS, Hints, check_start, clean, make_volume, silenced, simpleitk
+from .files import PathLike, check_start
+from .volume import NO_HINTS, Hints, clean, make_volume, silenced, simpleitk
 
 PICTURES = (".tif", ".tiff", ".png")
 NATIVE = ("1.2.840.10008.1.2", "1.2.840.10008.1.2.1", "1.2.840.10008.1.2.2")  # transfer syntaxes that do not compress

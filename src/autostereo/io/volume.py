@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 from ..errors import DependencyError, FileError, InputError
 from ..scene.appearance import Vector, check_vector
 from ..scene.volume import Volume
-from .files import PathLike, read_bytes
+from .files import PathLike, check_start, read_bytes
+from .metaimage import check_metaimage
 
 TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
 
@@ -116,11 +117,6 @@ def make_volume(values: NDArray, hints: Hints, spacing: Any = (1.0, 1.0, 1.0), *
     return Volume(values, spacing=spacing, **place)
 
 
-def check_start(path: PathLike) -> None:
-    """Raise a FileError for a file that is missing, empty, a web page, …, without reading all of it."""
-    read_bytes(path, limit=256)
-
-
 def simpleitk(path: PathLike) -> Any:
     """Return SimpleITK, or say how to install it."""
     try:
@@ -175,6 +171,8 @@ def load_itk(path: PathLike, hints: Hints = NO_HINTS) -> list[Volume]:
     path = Path(path)
     check_start(path)
     sitk = simpleitk(path)
+    if path.suffix.lower() in (".mha", ".mhd"):
+        check_metaimage(path)
     try:
         with silenced(sitk):
             return [_read_itk(sitk, path, path, hints)]
@@ -224,12 +222,6 @@ def _reason(path: Path, error: Exception) -> str:
     """What is wrong with a file, from SimpleITK's error."""
     if "Unable to determine ImageIO reader" in str(error):
         return f"is not a {path.suffix} file, damaged, or truncated"
-    if "MetaImage" in str(error):
-        found = re.search(rb"ElementDataFile\s*=\s*([^\r\n]+)", read_bytes(path))
-        name = found.group(1).decode("utf-8", "replace").strip() if found else "LOCAL"
-        if name.upper() != "LOCAL" and " " not in name and "%" not in name and not (path.parent / name).exists():
-            return f"needs {path.parent / name}, which does not exist"
-        return "is damaged or truncated: it holds less data than its header says"
     return f"cannot be read ({clean(error)})"
 
 
