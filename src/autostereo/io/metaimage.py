@@ -1,4 +1,5 @@
-"""Checks of MetaImage files, whose reader in ITK takes its defaults for numbers without sense and ignores broken zlib.
+"""Checks of MetaImage files, whose reader in ITK takes its defaults for numbers without sense, ignores broken zlib, and
+believes a wrong CompressedDataSize.
 
 Fields are those of the MetaIO documentation: https://itk.org/Wiki/ITK/MetaIO/Documentation.
 """
@@ -7,7 +8,11 @@ from __future__ import annotations
 
 import math
 import re
+import shutil
+import tempfile
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -19,29 +24,47 @@ HEADER = 1 << 20  # bytes of a file in which its header must end
 SIZES = {"CHAR": 1, "SHORT": 2, "INT": 4, "LONG": 4, "LONG_LONG": 8, "FLOAT": 4, "DOUBLE": 8}
 
 
-def check_metaimage(path: Path) -> None:
-    """Raise a FileError where the header has no sense, or where there is less data than it says."""
+@contextmanager
+def checked_metaimage(path: Path) -> Iterator[Path]:
+    """Give the header by which ITK reads `path` right: itself, or one with the true size of its compressed voxels.
+
+    Raises
+    ------
+    FileError
+        The header has no sense, or there is less data than it says.
+    """
     fields, start, listed = _read_header(path)
     size = _check_fields(path, fields)
     channels = fields.get("ElementNumberOfChannels", b"1").split()
     wanted = math.prod(size) * math.prod(map(int, channels)) * _bytes_of(path, fields)
     name = fields["ElementDataFile"].decode("utf-8", "replace")
-    if name.upper() == "LOCAL":
-        files = [path]
-    else:
-        start = 0
-        files = [path.parent / other for other in _names(path, name, listed, size)]
-    if fields.get("BinaryData", b"True")[:1] not in b"Tt1":
-        return
-    packed = fields.get("CompressedData", b"False")[:1] in b"Tt1"
+    local = name.upper() == "LOCAL"
+    files = [path] if local else [path.parent / other for other in _names(path, name, listed, size)]
+    start = start if local else 0
+    binary = fields.get("BinaryData", b"True")[:1] in b"Tt1"
+    packed = binary and fields.get("CompressedData", b"False")[:1] in b"Tt1"
+    part = wanted // len(files)
+    length = 0
     for file in files:
         if not file.is_file():
             raise FileError(f"{path}: needs {file}, which " + ("is a folder" if file.is_dir() else "does not exist"))
-        found = _unpacked(path, file, start, fields) if packed else file.stat().st_size - start
-        part = wanted // len(files)
-        if found < part or (packed and found > part):
+        length, found = _unpack(path, file, start) if packed else (0, file.stat().st_size - start)
+        if binary and (found < part or (packed and found > part)):
             sizes = f"{part:,} bytes of voxels expected, found {found:,}"
             raise FileError(f"{_where(path, file)} is damaged or truncated: {sizes}")
+    if not packed or len(files) > 1 or fields.get("CompressedDataSize") == str(length).encode():
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        header = Path(folder) / "header.mhd"
+        del fields["ElementDataFile"]  # which ends the header
+        fields |= {"CompressedDataSize": str(length).encode(), "ElementDataFile": b"voxels.zraw"}
+        lines = [key.encode() + b" = " + value for key, value in fields.items()]
+        header.write_bytes(b"\n".join(lines) + b"\n")
+        with files[0].open("rb") as source, (Path(folder) / "voxels.zraw").open("wb") as target:
+            source.seek(start)
+            shutil.copyfileobj(source, target)
+        yield header
 
 
 def _read_header(path: Path) -> tuple[dict[str, bytes], int, list[bytes]]:
@@ -124,22 +147,18 @@ def _names(path: Path, name: str, listed: list[bytes], size: list[int]) -> list[
         raise FileError(f"{path}: cannot use its {_shown('ElementDataFile', name.encode())}") from None
 
 
-def _unpacked(path: Path, file: Path, start: int, fields: dict[str, bytes]) -> int:
-    """Bytes that a compressed file holds, from `start` on."""
-    if "CompressedDataSize" not in fields and start:
-        raise FileError(f"{path}: compressed voxels need a CompressedDataSize, its header has none")
+def _unpack(path: Path, file: Path, start: int) -> tuple[int, int]:
+    """Bytes of the compressed voxels of a file from `start` on, and of what they unpack to."""
     packed = zlib.decompressobj(wbits=47)  # zlib or gzip
-    length = fields.get("CompressedDataSize", b"")
-    left = int(length) if length.isdigit() else file.stat().st_size
-    size = 0
+    length = size = 0
     with file.open("rb") as opened:
         opened.seek(start)
         try:
-            while not packed.eof and (part := opened.read(min(left, 1 << 16))):
-                left -= len(part)
+            while not packed.eof and (part := opened.read(1 << 16)):
+                length += len(part)
                 size += len(packed.decompress(part))
         except zlib.error as error:
             raise FileError(f"{_where(path, file)} holds damaged compressed voxels ({error})") from None
     if not packed.eof:
         raise FileError(f"{_where(path, file)} is truncated within its compressed voxels")
-    return size
+    return length - len(packed.unused_data), size

@@ -16,7 +16,7 @@ import re
 import tempfile
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,7 @@ from ..errors import DependencyError, FileError, InputError
 from ..scene.appearance import Vector, check_vector
 from ..scene.volume import Volume
 from .files import PathLike, check_start, read_bytes
-from .metaimage import check_metaimage
+from .metaimage import checked_metaimage
 
 TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
 
@@ -171,11 +171,10 @@ def load_itk(path: PathLike, hints: Hints = NO_HINTS) -> list[Volume]:
     path = Path(path)
     check_start(path)
     sitk = simpleitk(path)
-    if path.suffix.lower() in (".mha", ".mhd"):
-        check_metaimage(path)
+    same = checked_metaimage if path.suffix.lower() in (".mha", ".mhd") else nullcontext
     try:
-        with silenced(sitk):
-            return [_read_itk(sitk, path, path, hints)]
+        with same(path) as header, silenced(sitk):
+            return [_read_itk(sitk, header, path, hints)]
     except RuntimeError as error:
         if "ScalarWithSpace" not in str(error):
             raise FileError(f"{path}: {_reason(path, error)}") from None
