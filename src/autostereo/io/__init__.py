@@ -19,7 +19,8 @@ from .obj import load_obj
 from .pcd import load_pcd
 from .points import load_table
 from .raw import load_raw, load_vol
-from .volume import NO_HINTS, Hints, load_itk, load_tiff
+from .tiff import load_tiff
+from .volume import NO_HINTS, Hints, load_itk
 from .vtk import load_vti, load_vtk
 
 LOADERS: dict[str, Callable[[PathLike], Sequence[SceneObject]]] = {

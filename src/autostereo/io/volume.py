@@ -1,4 +1,4 @@
-"""Volumes from medical and microscopy files: NRRD, NIfTI and MetaImage by SimpleITK, TIFF stacks by tifffile.
+"""Volumes from medical and microscopy files: NRRD, NIfTI and MetaImage by SimpleITK.
 
 World frame. NIfTI and NRRD files say where patient left, posterior and superior are; ITK turns every such file into
 one frame, LPS: x to the patient's left, y to posterior, z to superior (a NIfTI header itself is written for RAS: its
@@ -10,7 +10,6 @@ slice.
 from __future__ import annotations
 
 import gzip
-import logging
 import os
 import re
 import tempfile
@@ -286,72 +285,3 @@ def without_space(path: Path) -> Iterator[Path]:
         patched = Path(folder) / "header.nhdr"
         patched.write_text("\n".join(lines) + "\n\n", encoding="latin-1")
         yield patched
-
-
-# --- TIFF ----------------------------------------------------------------------------------------------------------
-def load_tiff(path: PathLike, hints: Hints = NO_HINTS) -> list[Volume]:
-    """Read a TIFF of several pages: x along a row, y downwards in the picture, z from page to page.
-
-    Spacing comes from OME or ImageJ metadata, else it is 1. Times and channels of a hyperstack are frames.
-
-    Raises
-    ------
-    DependencyError
-        tifffile is not installed, or the file's compression needs imagecodecs.
-    FileError
-        The file is missing, damaged, truncated, a single or coloured picture, or none of its frames is chosen.
-    """
-    check_start(path)
-    try:
-        import tifffile
-    except ImportError:
-        raise DependencyError(f"{path}: needs tifffile: pip install autostereo[volumes]") from None
-    log = logging.getLogger("tifffile")
-    was, log.disabled = log.disabled, True
-    try:
-        with tifffile.TiffFile(path) as tiff:
-            series = tiff.series[0]
-            array, axes = series.asarray(), series.axes
-            spacing = _tiff_spacing(tiff)
-            pages = len(tiff.pages)
-    except MemoryError:
-        raise
-    except Exception as error:  # tifffile and its decoders raise many kinds
-        if "imagecodecs" in str(error):
-            raise DependencyError(f"{path}: its compression needs imagecodecs: pip install imagecodecs") from None
-        reason = " ".join(str(error).split())[:160]
-        raise FileError(f"{path}: is damaged, truncated or not a TIFF ({reason})") from error
-    finally:
-        log.disabled = was
-    if "S" in axes:
-        raise FileError(f"{path}: is a picture in colour, expected one number a voxel")
-    if array.ndim < 3:
-        extra = f", followed by {pages - 1} of other sizes" if pages > 1 else ""
-        raise FileError(f"{path}: is one picture of {array.shape[-1]}×{array.shape[0]}{extra}, expected a stack")
-    others = [k for k, axis in enumerate(axes) if axis not in "YX"]
-    z = axes.index("Z") if "Z" in axes else others[-1]
-    frames = [k for k in others if k != z]
-    array = array.transpose([*frames, z, axes.index("Y"), axes.index("X")])
-    array = array.reshape(-1, *array.shape[-3:])
-    return [make_volume(array[hints.choose(len(array), path)], hints, spacing)]
-
-
-def _tiff_spacing(tiff: Any) -> Vector:
-    """Spacing along x, y, z: OME's physical sizes, else ImageJ's, else 1."""
-    if tiff.ome_metadata:
-        sizes = [re.search(rf'PhysicalSize{axis}="([^"]+)"', tiff.ome_metadata) for axis in "XYZ"]
-        x, y, z = (float(size.group(1)) if size else 0.0 for size in sizes)
-    elif tiff.imagej_metadata:
-        tags = tiff.pages[0].tags
-        x, y = (_pixel_size(tags.get(name)) for name in ("XResolution", "YResolution"))
-        z = float(tiff.imagej_metadata.get("spacing", 0.0))
-    else:
-        return 1.0, 1.0, 1.0
-    x = x if x > 0 else 1.0
-    return x, (y if y > 0 else x), (z if z > 0 else x)
-
-
-def _pixel_size(tag: Any) -> float:
-    """Units a pixel, from a tag of pixels a unit as a fraction; 0 if there is none."""
-    above, below = tag.value if tag is not None else (0, 1)
-    return below / above if above else 0.0
