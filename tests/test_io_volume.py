@@ -183,6 +183,47 @@ def test_a_gzip_of_several_members_is_whole(tmp_path):
     check_phantom(load_one(tmp_path / "b.nii.gz"))
 
 
+@pytest.mark.parametrize("dtype", ["<i2", "<f4"])
+def test_damaged_nifti_gz(tmp_path, dtype):
+    """Its end still tells the right size, and ITK looks at the sum before it in small files only."""
+    kind = (4, 16) if dtype == "<i2" else (16, 32)
+    values = np.random.default_rng(0).integers(0, 30000, (60, 80, 100)).astype(dtype)
+    whole = nifti(np.column_stack([np.eye(3), np.zeros(3)]), values, datatype=kind)
+    packed = gzip.compress(whole)
+    path = tmp_path / "a.nii.gz"
+    path.write_bytes(packed)
+    assert np.array_equal(load_one(path).values, values)
+    for at in (-7, len(packed) // 2):
+        bad = bytearray(packed)
+        bad[at] ^= 255
+        path.write_bytes(bad)
+        refused(path, "damaged")
+    # stored without compression, so that nothing but the sum shows it
+    bad = bytearray(gzip.compress(whole, compresslevel=0))
+    bad[-100] ^= 1
+    path.write_bytes(bad)
+    refused(path, "is damaged (CRC check failed")
+
+
+@pytest.mark.parametrize(
+    ("at", "number", "message"),
+    [
+        (80, 0.0, "cannot use its voxels' size (pixdim), 0, 1, 1"),
+        (88, np.nan, "cannot use its voxels' size (pixdim), 1, 1, nan"),
+        (108, np.nan, "cannot use the place of its voxels (vox_offset), nan"),
+        (108, -5.0, "cannot use the place of its voxels (vox_offset), -5"),
+    ],
+)
+@pytest.mark.parametrize("suffix", [".nii", ".nii.gz"])
+def test_nifti_headers_without_sense(tmp_path, at, number, message, suffix):
+    """ITK takes its defaults for them."""
+    data = bytearray(nifti(np.column_stack([np.eye(3), np.zeros(3)]), phantom("<i2")))
+    data[at : at + 4] = np.array([number], "<f4").tobytes()
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(gzip.compress(bytes(data)) if suffix == ".nii.gz" else data)
+    refused(path, message)
+
+
 @pytest.mark.parametrize("suffix", [".mhd", ".nhdr"])
 def test_missing_and_short_data_files(tmp_path, capfd, suffix):
     path = write(tmp_path / f"a{suffix}")

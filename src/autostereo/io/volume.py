@@ -9,11 +9,9 @@ slice.
 
 from __future__ import annotations
 
-import gzip
 import os
 import re
 import tempfile
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
@@ -28,6 +26,7 @@ from ..scene.appearance import Vector, check_vector
 from ..scene.volume import Volume
 from .files import PathLike, check_start, read_bytes
 from .metaimage import checked_metaimage
+from .nifti import check_nifti
 
 TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
 
@@ -197,7 +196,7 @@ def _read_itk(sitk: Any, file: Path, path: Path, hints: Hints) -> Volume:
     frames = int(np.prod(size[3:]))
     frame = hints.choose(frames, path)
     if path.name.lower().endswith((".nii", ".nii.gz")):
-        _check_nifti(path, reader)
+        check_nifti(path, reader)
     if axes > 3:
         later = np.unravel_index(frame, size[3:], order="F")
         reader.SetExtractSize([*size[:3], *[0] * (axes - 3)])
@@ -219,51 +218,8 @@ def _is_anatomical(reader: Any) -> bool:
 def _reason(path: Path, error: Exception) -> str:
     """What is wrong with a file, from SimpleITK's error."""
     if "Unable to determine ImageIO reader" in str(error):
-        return f"is not a {path.suffix} file, damaged, or truncated"
+        return f"is not a {'.nii.gz' if path.suffix.lower() == '.gz' else path.suffix} file, damaged, or truncated"
     return f"cannot be read ({clean(error)})"
-
-
-def _check_nifti(path: Path, reader: Any) -> None:
-    """Refuse a truncated NIfTI file and one with NaN: ITK takes what is missing or not finite for zeros."""
-    start = int(float(reader.GetMetaData("vox_offset")))
-    bits = int(reader.GetMetaData("bitpix"))
-    wanted = start + int(np.prod(reader.GetSize())) * bits // 8
-    floats = int(reader.GetMetaData("datatype")) in (16, 64)
-    if not floats and _size_told(path) == wanted % 2**32:
-        return
-    found, bad = _scan(path, start, f"f{bits // 8}" if floats else None)
-    if found < wanted:
-        raise FileError(f"{path}: truncated: {wanted:,} bytes expected, found {found:,}")
-    if bad:
-        raise FileError(f"{path}: expected finite numbers, found NaN or infinity in {bad:,} voxels")
-
-
-def _size_told(path: Path) -> int:
-    """Bytes of a file once unpacked, modulo 2³², as a gzip file of one member says at its end."""
-    if path.suffix.lower() != ".gz":
-        return path.stat().st_size % 2**32
-    with open(path, "rb") as file:
-        file.seek(-4, os.SEEK_END)
-        return int.from_bytes(file.read(), "little")
-
-
-def _scan(path: Path, start: int, kind: str | None) -> tuple[int, int]:
-    """Bytes of a NIfTI file, as far as it can be unpacked, and how many numbers from `start` on are not finite."""
-    size = bad = 0
-    try:
-        with gzip.open(path) if path.suffix.lower() == ".gz" else open(path, "rb") as file:
-            head = file.read(start)
-            size = len(head)
-            order = "<" if head[:1] in (b"\x5c", b"\x1c") else ">"  # the low byte of the header's size, 348 or 540
-            dtype = np.dtype(order + (kind or "u1"))
-            while part := file.read(1 << 22):
-                size += len(part)
-                if kind:
-                    numbers = np.frombuffer(part, dtype, len(part) // dtype.itemsize)
-                    bad += int(np.count_nonzero(~np.isfinite(numbers)))
-    except (OSError, EOFError, zlib.error):
-        pass
-    return size, bad
 
 
 @contextmanager
