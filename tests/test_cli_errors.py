@@ -154,6 +154,11 @@ def test_output_folder_is_a_file(cli: Run, folder: Path) -> None:
         '{"offsets": [1, 0]}',
         '{"colour": 1}',
         '{"up": [0, 0, 1], "position": [0, 0, 4], "target": [0, 0, 0]}',
+        "[" * 50_000,
+        f'{{"fov_y": {"9" * 400}}}',
+        f'{{"fov_y": {"9" * 5000}}}',
+        f'{{"up": [0, {"9" * 400}, 0]}}',
+        f'{{"offsets": [0, {"9" * 400}]}}',
     ],
 )
 def test_bad_camera_file(cli: Run, folder: Path, text: str) -> None:
