@@ -99,6 +99,8 @@ def test_usage_errors(cli: Run) -> None:
     refused(cli("render"), "Missing")
     refused(cli("render", "square.off"), "--display")
     refused(cli("paint"), "paint")
+    refused(cli("render", "", "-d", "lenticular-8"), "argument 2 is empty")
+    refused(cli("render", "square.off", "-d", "lenticular-8", "-o", ""), "argument 6 is empty")
     refused(cli("render", "square.off", "-d", "looking-glass-portrai", *SMALL), "looking-glass-portrait")
 
 

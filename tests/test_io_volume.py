@@ -124,6 +124,14 @@ def test_nrrd_with_a_space_but_spacings_per_axis(tmp_path, detached, encoding):
     check_phantom(load_one(path), origin=(0, 0, 0))
 
 
+def test_nrrd_of_axes_that_are_not_independent(tmp_path):
+    head = "NRRD0004\ntype: int16\ndimension: 3\nspace: right-anterior-superior\nsizes: 9 7 5\n"
+    head += "space directions: (1,0,0) (1,0,0) (0,0,1)\nendian: little\nencoding: raw\n\n"
+    path = tmp_path / "a.nrrd"
+    path.write_bytes(head.encode() + phantom("<i2").tobytes())
+    refused(path, "cannot use the directions of its axes, which are not independent")
+
+
 def test_nrrd_over_one_file_a_slice(tmp_path):
     for k, plane in enumerate(phantom("<i2")):
         (tmp_path / f"s.{k + 1}").write_bytes(plane.tobytes())

@@ -99,6 +99,8 @@ def load(
     for path in paths:
         if not isinstance(path, (str, Path)) and not hasattr(path, "__fspath__"):
             raise InputError(f"load: expected a path, got {type(path).__name__}")
+        if path == "":  # which Path takes for the current folder
+            raise InputError("load: expected a path, got an empty text")
         path = Path(path)
         try:
             with np.errstate(all="ignore"):  # broken numbers are found by the checks of the objects

@@ -219,6 +219,8 @@ def _reason(path: Path, error: Exception) -> str:
     """What is wrong with a file, from SimpleITK's error."""
     if "Unable to determine ImageIO reader" in str(error):
         return f"is not a {'.nii.gz' if path.suffix.lower() == '.gz' else path.suffix} file, damaged, or truncated"
+    if "determinant is 0" in str(error):
+        return "cannot use the directions of its axes, which are not independent"
     return f"cannot be read ({clean(error)})"
 
 
