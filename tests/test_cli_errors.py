@@ -99,6 +99,8 @@ def test_usage_errors(cli: Run) -> None:
     refused(cli("render"), "Missing")
     refused(cli("render", "square.off"), "--display")
     refused(cli("paint"), "paint")
+    refused(cli("render", "", "-d", "lenticular-8"), "argument 2 is empty")
+    refused(cli("render", "square.off", "-d", "lenticular-8", "-o", ""), "argument 6 is empty")
     refused(cli("render", "square.off", "-d", "looking-glass-portrai", *SMALL), "looking-glass-portrait")
 
 
@@ -154,6 +156,11 @@ def test_output_folder_is_a_file(cli: Run, folder: Path) -> None:
         '{"offsets": [1, 0]}',
         '{"colour": 1}',
         '{"up": [0, 0, 1], "position": [0, 0, 4], "target": [0, 0, 0]}',
+        "[" * 50_000,
+        f'{{"fov_y": {"9" * 400}}}',
+        f'{{"fov_y": {"9" * 5000}}}',
+        f'{{"up": [0, {"9" * 400}, 0]}}',
+        f'{{"offsets": [0, {"9" * 400}]}}',
     ],
 )
 def test_bad_camera_file(cli: Run, folder: Path, text: str) -> None:

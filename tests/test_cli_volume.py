@@ -81,7 +81,7 @@ def test_info_of_a_mixed_scene(cli: Run, folder: Path) -> None:
         (("a.raw", "--shape", "9x7x-5", "--dtype", "uint8"), "--shape: expected three whole numbers"),
         (("a.raw", "--shape", "9x7x5", "--dtype", "float16"), "dtype: expected one of"),
         (("a.raw", "--shape", "9x7x6", "--dtype", "uint8"), "takes 378 bytes, the file has 315"),
-        (("a.raw", *RAW, "--spacing", "1,2"), "--spacing: expected 3 numbers"),
+        (("a.raw", *RAW, "--spacing", "1,2"), "--spacing: expected 3 finite numbers"),
         (("a.raw", *RAW, "--spacing", "1,2,0"), "spacing: expected numbers > 0"),
         (("a.raw", *RAW, "--mode", "xray"), "mode: expected one of composite, mip, iso"),
         (("a.raw", *RAW, "--mode", "mip", "--iso", "3"), "--iso: needs --mode iso"),
@@ -192,6 +192,12 @@ def test_the_first_run_of_every_primitive_says_that_it_compiles(
         ((*stack, "triangle.off", "points.xyz"), ["draw_views-", "splat_views-"]),
         ((*panel, "a.raw", *RAW, "triangle.off"), ["draw_panel-", "draw_panel_rays-"]),
         ((*panel, "points.xyz", "--method", "n-pass"), ["splat_views-"]),
+        ((*panel, "a.raw", *RAW, "--method", "n-pass"), ["draw_rows-"]),
+        ((*panel, "a.raw", *RAW, "--method", "dibr"), ["draw_rows-", "warp_rows-"]),
+        ((*panel, "a.raw", *RAW, "--iso", "50"), ["draw_panel_rays-"]),
+        ((*panel, "a.raw", *RAW, "--mode", "mip"), ["draw_panel_rays-"]),
+        ((*stack, "a.raw", *RAW, "--views", "1"), ["draw_rows-"]),
+        (("render", "-d", "philips-wowvx", "a.raw", *RAW), ["draw_rows-"]),
     ):
         asked.clear()
         assert cli(*arguments).err.startswith("compiling kernels")

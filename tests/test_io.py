@@ -151,6 +151,8 @@ def test_importing_and_loading_needs_neither_trimesh_nor_pillow(tmp_path):
 def test_load_wants_paths():
     with pytest.raises(InputError, match="at least one path"):
         load()
+    with pytest.raises(InputError, match="expected a path, got an empty text"):
+        load("")
     with pytest.raises(InputError, match="expected a path, got int"):
         load(5)
 

@@ -157,12 +157,77 @@ def test_truncated_slice(tmp_path, capfd, share):
     files = write_series(tmp_path, values)
     data = files[2].read_bytes()
     files[2].write_bytes(data[: int(len(data) * share)])
-    with pytest.warns(UserWarning, match=f"{files[2].name} is left out: no picture, damaged or truncated"):
-        refused(tmp_path, "slices are missing", "the next one is 6 away, usual are 3")
+    lost = f"({files[2].name} is left out: no picture, damaged or truncated)"
+    refused(tmp_path, "slices are missing", "the next one is 6 away, usual are 3", lost)
     files[3].unlink()  # at the end nothing shows that a slice is missing
     with pytest.warns(UserWarning, match="left out"):
         assert np.array_equal(load_one(tmp_path).values, values[:2])
     assert capfd.readouterr() == ("", "")
+
+
+def shortened(file, lost=40):
+    """Take pixels away from the end of a file, whose header stays consistent in itself."""
+    data = file.read_bytes()
+    at = data.rindex(b"\xe0\x7f\x10\x00") + 4
+    at += 4 * data[at:].startswith((b"OW", b"OB"))
+    length = int.from_bytes(data[at : at + 4], "little") - lost
+    file.write_bytes(data[:at] + length.to_bytes(4, "little") + data[at + 4 : -lost])
+
+
+def test_fewer_pixels_than_announced(tmp_path):
+    """The missing ones would be whatever lay in memory."""
+    files = write_series(tmp_path)
+    shortened(files[2])
+    refused(tmp_path, f"{files[2].name}: is damaged or truncated: 126 bytes of pixels expected, found 86")
+    path = tmp_path / "a.dcm"
+    sitk.WriteImage(sitk.GetImageFromArray(phantom("uint8")), str(path))
+    shortened(path)
+    refused(path, "a.dcm: is damaged or truncated: 315 bytes of pixels expected, found 276")
+
+
+def test_files_by_name_only(tmp_path):
+    files = write_series(tmp_path)
+    files[2].write_bytes(b"")
+    refused(tmp_path, "slices are missing", f"({files[2].name} is left out: no picture, damaged or truncated)")
+    for file in files.values():
+        file.write_bytes(file.read_bytes()[:140])
+    refused(tmp_path, "has no DICOM series that can be read (1_000.dcm and 4 more are left out")
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("PixelSpacing", b"2\\.5", b"0\\.5"),
+        ("PixelSpacing", b"2\\.5", b"nan "),
+        ("ImageOrientationPatient", b"1\\0\\0\\0\\1\\0", b"0\\0\\0\\0\\0\\0"),
+        ("ImagePositionPatient", b"10\\-20\\", b"nan\\20\\"),
+        ("RescaleSlope", b"\x28\0\x53\x10\2\0\0\0" + b"1", b"\x28\0\x53\x10\2\0\0\0" + b"0"),
+        ("RescaleIntercept", b"\x28\0\x52\x10\2\0\0\0" + b"0", b"\x28\0\x52\x10\2\0\0\0" + b"x"),
+    ],
+)
+def test_places_without_sense(tmp_path, name, old, new):
+    files = write_series(tmp_path, turn=np.eye(3))
+    data = files[1].read_bytes()
+    assert old in data and len(old) == len(new), data
+    files[1].write_bytes(data.replace(old, new))
+    refused(tmp_path, f"{files[1].name}: cannot use its {name}")
+
+
+def without(file, tag):
+    """Turn an element of a file into one that nobody knows."""
+    data = file.read_bytes()
+    assert tag in data
+    file.write_bytes(data.replace(tag, tag[:2] + bytes([tag[2] + 2]) + tag[3:]))
+
+
+def test_places_that_are_not_told(tmp_path):
+    files = write_series(tmp_path, turn=np.eye(3))
+    for file in files.values():
+        without(file, b"\x28\0\x30\0")
+    with pytest.warns(UserWarning, match="dcm has no PixelSpacing; 1 is taken"):
+        assert load_one(tmp_path).spacing == (1, 1, 3)
+    without(files[3], b"\x20\0\x32\0")
+    refused(tmp_path, f"{files[3].name} does not say where it lies (ImagePositionPatient)")
 
 
 def test_other_files_in_the_folder_do_not_matter(tmp_path):

@@ -72,6 +72,8 @@ def test_bad_ply_points(tmp_path):
     refused(ply(tmp_path, POSITION, table(XYZ)[:-4]), "truncated")
     names = [*POSITION, "float red", "float green", "float blue"]
     refused(ply(tmp_path, names, table(XYZ, RGB - 9)), "expected colours in 0…1, 0…255 or 0…65535, found -9…246")
+    colors = RGB * [[1, 1, np.nan], *[[1, 1, 1]] * 3]
+    refused(ply(tmp_path, names, table(XYZ, colors)), "0…65535, found NaN in 1 of 12")
 
 
 def test_obj_without_faces_is_points(tmp_path):

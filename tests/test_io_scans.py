@@ -174,6 +174,14 @@ def test_las_headers_that_announce_too_much(tmp_path, name, at, value, words):
     refused(write(tmp_path, f"b{name}", bytes(data)), words)
 
 
+def test_las_of_a_format_that_does_not_exist(tmp_path):
+    path = las(tmp_path)
+    data = bytearray(path.read_bytes())
+    data[104] = 16
+    path.write_bytes(data)
+    refused(path, "has points of format 16, expected 0 to 10")
+
+
 def test_laz_with_a_damaged_table_of_chunks(tmp_path):
     data = bytearray(las(tmp_path, "a.laz").read_bytes())
     start = struct.unpack_from("<I", data, 96)[0]

@@ -124,6 +124,14 @@ def test_nrrd_with_a_space_but_spacings_per_axis(tmp_path, detached, encoding):
     check_phantom(load_one(path), origin=(0, 0, 0))
 
 
+def test_nrrd_of_axes_that_are_not_independent(tmp_path):
+    head = "NRRD0004\ntype: int16\ndimension: 3\nspace: right-anterior-superior\nsizes: 9 7 5\n"
+    head += "space directions: (1,0,0) (1,0,0) (0,0,1)\nendian: little\nencoding: raw\n\n"
+    path = tmp_path / "a.nrrd"
+    path.write_bytes(head.encode() + phantom("<i2").tobytes())
+    refused(path, "cannot use the directions of its axes, which are not independent")
+
+
 def test_nrrd_over_one_file_a_slice(tmp_path):
     for k, plane in enumerate(phantom("<i2")):
         (tmp_path / f"s.{k + 1}").write_bytes(plane.tobytes())
@@ -172,10 +180,7 @@ def test_truncated(tmp_path, capfd, suffix, compress, share):
     assert np.array_equal(load_one(path).values, values)
     data = path.read_bytes()
     path.write_bytes(data[: int(len(data) * share)])
-    if suffix == ".tif" and share == 0.999 and not compress:  # lost are only what the last pages say of themselves
-        assert np.array_equal(load_one(path).values, values)
-    else:
-        refused(path)
+    refused(path)
     assert capfd.readouterr() == ("", "")
 
 
@@ -184,6 +189,47 @@ def test_a_gzip_of_several_members_is_whole(tmp_path):
     data = path.read_bytes()
     (tmp_path / "b.nii.gz").write_bytes(gzip.compress(data[:500]) + gzip.compress(data[500:]))
     check_phantom(load_one(tmp_path / "b.nii.gz"))
+
+
+@pytest.mark.parametrize("dtype", ["<i2", "<f4"])
+def test_damaged_nifti_gz(tmp_path, dtype):
+    """Its end still tells the right size, and ITK looks at the sum before it in small files only."""
+    kind = (4, 16) if dtype == "<i2" else (16, 32)
+    values = np.random.default_rng(0).integers(0, 30000, (60, 80, 100)).astype(dtype)
+    whole = nifti(np.column_stack([np.eye(3), np.zeros(3)]), values, datatype=kind)
+    packed = gzip.compress(whole)
+    path = tmp_path / "a.nii.gz"
+    path.write_bytes(packed)
+    assert np.array_equal(load_one(path).values, values)
+    for at in (-7, len(packed) // 2):
+        bad = bytearray(packed)
+        bad[at] ^= 255
+        path.write_bytes(bad)
+        refused(path, "damaged")
+    # stored without compression, so that nothing but the sum shows it
+    bad = bytearray(gzip.compress(whole, compresslevel=0))
+    bad[-100] ^= 1
+    path.write_bytes(bad)
+    refused(path, "is damaged (CRC check failed")
+
+
+@pytest.mark.parametrize(
+    ("at", "number", "message"),
+    [
+        (80, 0.0, "cannot use its voxels' size (pixdim), 0, 1, 1"),
+        (88, np.nan, "cannot use its voxels' size (pixdim), 1, 1, nan"),
+        (108, np.nan, "cannot use the place of its voxels (vox_offset), nan"),
+        (108, -5.0, "cannot use the place of its voxels (vox_offset), -5"),
+    ],
+)
+@pytest.mark.parametrize("suffix", [".nii", ".nii.gz"])
+def test_nifti_headers_without_sense(tmp_path, at, number, message, suffix):
+    """ITK takes its defaults for them."""
+    data = bytearray(nifti(np.column_stack([np.eye(3), np.zeros(3)]), phantom("<i2")))
+    data[at : at + 4] = np.array([number], "<f4").tobytes()
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(gzip.compress(bytes(data)) if suffix == ".nii.gz" else data)
+    refused(path, message)
 
 
 @pytest.mark.parametrize("suffix", [".mhd", ".nhdr"])
@@ -274,40 +320,6 @@ def test_missing_packages_are_named(tmp_path, monkeypatch, module, suffix):
     path.write_bytes(b"II*\0" + bytes(100))
     monkeypatch.setitem(sys.modules, module, None)
     refused(path, module, "pip install autostereo[volumes]", error=aus.DependencyError)
-
-
-# --- TIFF ----------------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("compression", [None, "zlib"])
-def test_tiff_stack(tmp_path, compression):
-    path = tmp_path / "a.tif"
-    tifffile.imwrite(path, phantom("uint16"), compression=compression, photometric="minisblack")
-    check_phantom(load_one(path), spacing=(1, 1, 1), origin=(0, 0, 0))
-    check_phantom(load_one(path, spacing=SPACING), origin=(0, 0, 0))
-
-
-def test_tiff_of_imagej(tmp_path):
-    path = tmp_path / "a.tif"
-    meta = {"spacing": SPACING[2], "unit": "um", "axes": "ZYX"}
-    tifffile.imwrite(path, phantom("uint16"), imagej=True, resolution=(1 / SPACING[0], 1 / SPACING[1]), metadata=meta)
-    check_phantom(load_one(path), origin=(0, 0, 0))
-
-
-def test_tiff_hyperstacks_have_frames(tmp_path):
-    path = tmp_path / "a.ome.tif"
-    stack = np.stack([np.stack([phantom("uint16") * (1 + c + 2 * t) for c in (0, 1)]) for t in (0, 1, 2)])
-    meta = {"axes": "TCZYX", **{f"PhysicalSize{axis}": s for axis, s in zip("XYZ", SPACING, strict=True)}}
-    tifffile.imwrite(path, stack, metadata=meta)
-    for frame in range(6):
-        check_phantom(load_one(path, frame=frame), origin=(0, 0, 0), value=100 * (1 + frame))
-    refused(path, "holds 6 frames")
-
-
-def test_tiffs_that_are_no_stack(tmp_path):
-    path = tmp_path / "a.tif"
-    tifffile.imwrite(path, phantom("uint8")[0])
-    refused(path, "one picture of 9×7", "expected a stack")
-    tifffile.imwrite(path, np.zeros((5, 7, 9, 3), np.uint8), photometric="rgb")
-    refused(path, "colour")
 
 
 # --- NumPy ---------------------------------------------------------------------------------------------------------

@@ -257,7 +257,12 @@ def test_json_is_plain(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [("", "not JSON"), ("{", "not JSON"), ("3", "points"), ("{}", "points"), ('{"points": 3}', "points"),
-     ('{"points": [[0, 0, 0, 0]]}', r"got shape \(1, 4\)"), ('{"points": [[0, 0, 0, 0, "x"]]}', "five numbers")],
+     ('{"points": [[0, 0, 0, 0]]}', r"got shape \(1, 4\)"), ('{"points": [[0, 0, 0, 0, "x"]]}', "five numbers"),
+     ('{"points": [[0, 0, 0, 0, "1"]]}', "five numbers"), ('{"points": [[0, 0, 0, 0, true]]}', "five numbers"),
+     ('{"points": [[0, 0, 0, 0, [1]]]}', "five numbers"), ('{"points": [[0, 0, 0, 0, %s]]}' % ("9" * 400), "five numb"),
+     ('{"points": [[0, 0, 0, 0, %s]]}' % ("9" * 5000), "not JSON"), ("[" * 50_000, "not JSON"),
+     ('{"points": [[0, 0, 0, 0, 1]], "zzz": 1}', "unknown fields zzz"),
+     ('{"points": [[0, 0, 0, 0, 1]], "type": 5}', "expected the type 'autostereo transfer function', found '5'")],
 )  # fmt: skip
 def test_bad_files_are_refused(tmp_path, text, words):
     path = tmp_path / "a.json"

@@ -141,6 +141,9 @@ def test_defaults():
         ({"spacing": (1, 0, 1)}, "spacing: expected numbers > 0"),
         ({"spacing": (1, np.nan, 1)}, "spacing"),
         ({"spacing": 1.0}, "spacing: expected three"),
+        ({"spacing": (1e-300, 1, 1)}, "spacing: expected voxels of 1e-30 and more"),
+        ({"spacing": (1e15, 1, 1)}, r"spacing: expected voxels of 1e-30 and more within ±1e\+15, got 1e\+15 × 1 × 1"),
+        ({"transform": np.diag([1e-40, 1, 1, 1])}, "spacing: expected voxels of 1e-30 and more"),
         ({"origin": (1, 2)}, "origin: expected three"),
         ({"direction": np.eye(4)}, "direction: expected a 3×3"),
         ({"direction": np.diag([1, 2, 1])}, "unit length, found lengths 1, 2, 1"),
@@ -199,6 +202,16 @@ def test_histogram_is_that_of_numpy(dtype, bins):
 def test_histogram_of_a_constant():
     counts, _ = make(np.full((2, 2, 2), 5, np.uint8)).histogram(3)
     assert counts.sum() == 8 and np.count_nonzero(counts) == 1
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.parametrize("value", [2.0**40, 1.0, -1e29, 1e-40, 0.0])
+@pytest.mark.parametrize("steps", [0, 1, 2, 300])
+def test_histogram_of_values_that_differ_by_roundings(dtype, value, steps):
+    values = np.full((4, 4, 4), value, dtype)
+    values[0, 0, 0] += steps * np.spacing(values[0, 0, 0])
+    counts, edges = aus.Volume(values).histogram()
+    assert counts.sum() == 64 and (np.diff(edges) > 0).all() and edges[0] <= value <= edges[-1]
 
 
 def test_otsu_parts_two_peaks_in_the_middle():

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from .. import __version__
-from ..errors import AutostereoError
+from ..errors import AutostereoError, InputError
 from . import common
 from .bench import bench
 from .demo import demo
@@ -76,6 +76,8 @@ def run(arguments: Sequence[str]) -> int:
     arguments = list(arguments) or ["--help"]
     debug = os.environ.get("AUTOSTEREO_DEBUG", "0") not in ("", "0")
     try:
+        if "" in arguments:  # Path takes it for the current folder
+            raise InputError(f"argument {arguments.index('') + 1} is empty, expected a path or a value")
         with warnings.catch_warnings():
             warnings.showwarning = lambda message, *_, **__: common.note(f"autostereo: note: {message}")
             status = typer.main.get_command(app).main(args=arguments, prog_name="autostereo", standalone_mode=False)

@@ -125,7 +125,7 @@ def parse_numbers(text: str, name: str, count: int) -> tuple[float, ...]:
     except ValueError:
         numbers = ()
     if len(numbers) != count or not all(abs(number) < float("inf") for number in numbers):
-        raise InputError(f"{name}: expected {count} numbers separated by commas, got {text!r}")
+        raise InputError(f"{name}: expected {count} finite numbers separated by commas, got {text!r}")
     return numbers
 
 

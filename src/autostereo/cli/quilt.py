@@ -83,7 +83,7 @@ def quilt(
     from ..engines.cpu.kernels import kernels_for
     from ..render import render_views
 
-    common.announce_compilation(engine, *kernels_for(scene, None, options))
+    common.announce_compilation(engine, *kernels_for(scene, None, options, method, rig.views))
     with common.working(f"rendering {rig.views} views"):
         stack = render_views(scene, rig, layout.tile, method=method, engine=engine, options=options)
     with common.working("writing"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
@@ -72,8 +73,8 @@ def render(
     from ..render import render as draw
 
     rig = rig or Rig.frame(scene, where, side)
-    one_pass = where.viewmap if method == "single-pass" else None
-    common.announce_compilation(engine, *kernels_for(scene, one_pass, options))
+    kept = replace(options, depth=where.layout == "rgbd")  # as Renderer does for displays of 2D + depth
+    common.announce_compilation(engine, *kernels_for(scene, where.viewmap, kept, method, rig.views))
     start = perf_counter()
     with common.working("rendering"):
         panel = draw(scene, where, rig, method=method, engine=engine, options=options)

@@ -99,7 +99,7 @@ def views(
     from ..engines.cpu.kernels import kernels_for
     from ..render import render_views
 
-    common.announce_compilation(engine, *kernels_for(scene, None, options))
+    common.announce_compilation(engine, *kernels_for(scene, None, options, method, rig.views))
     with common.working(f"rendering {rig.views} views"):
         stack = render_views(scene, rig, pixels, method=method, engine=engine, options=options)
     write_views(output, stack, rig)

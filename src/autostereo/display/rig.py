@@ -27,7 +27,10 @@ SPACINGS = ("linear", "equal-angle", "cell-centred")
 def _number(name: str, value: object, low: float, high: float, open_low: bool = False) -> float:
     if isinstance(value, (bool, str)) or not np.isscalar(value):
         raise InputError(f"rig {name}: expected a number, got {value!r}")
-    number = float(value)  # type: ignore[arg-type]
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except OverflowError:  # a whole number of hundreds of digits
+        number = np.inf
     if not np.isfinite(number) or not low <= number <= high or (open_low and number == low):
         bracket = "(" if open_low else "["
         raise InputError(f"rig {name}: expected a number in {bracket}{low:g}, {high:g}], got {value!r}")
@@ -37,7 +40,7 @@ def _number(name: str, value: object, low: float, high: float, open_low: bool = 
 def _vector(name: str, value: object) -> Vector:
     try:
         v = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"rig {name}: expected three numbers, got {value!r}") from None
     if v.shape != (3,) or not np.isfinite(v).all():
         raise InputError(f"rig {name}: expected three finite numbers, got {value!r}")
@@ -108,7 +111,7 @@ class Rig:
     def _check_offsets(self) -> None:
         try:
             given = np.asarray(self.offsets, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise InputError(f"rig offsets: expected numbers, got {self.offsets!r}") from None
         if given.ndim != 1 or given.size == 0 or not np.isfinite(given).all() or (np.diff(given) <= 0).any():
             raise InputError("rig offsets: expected finite numbers, strictly ascending (view 0 is the leftmost)")
@@ -189,7 +192,7 @@ class Rig:
             fields: Any = json.loads(path.read_text(encoding="utf-8"))
         except OSError as error:
             raise FileError(f"{path}: cannot be read ({error.strerror})") from error
-        except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        except (ValueError, RecursionError) as error:
             raise FileError(f"{path}: expected a rig as JSON ({error})") from error
         if not isinstance(fields, dict):
             raise FileError(f"{path}: expected a JSON object of rig fields, got {type(fields).__name__}")

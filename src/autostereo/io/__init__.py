@@ -19,7 +19,8 @@ from .obj import load_obj
 from .pcd import load_pcd
 from .points import load_table
 from .raw import load_raw, load_vol
-from .volume import NO_HINTS, Hints, load_itk, load_tiff
+from .tiff import load_tiff
+from .volume import NO_HINTS, Hints, load_itk
 from .vtk import load_vti, load_vtk
 
 LOADERS: dict[str, Callable[[PathLike], Sequence[SceneObject]]] = {
@@ -98,6 +99,8 @@ def load(
     for path in paths:
         if not isinstance(path, (str, Path)) and not hasattr(path, "__fspath__"):
             raise InputError(f"load: expected a path, got {type(path).__name__}")
+        if path == "":  # which Path takes for the current folder
+            raise InputError("load: expected a path, got an empty text")
         path = Path(path)
         try:
             with np.errstate(all="ignore"):  # broken numbers are found by the checks of the objects

@@ -61,6 +61,11 @@ def read_bytes(path: PathLike, asked_by: PathLike | None = None, limit: int = -1
     return data
 
 
+def check_start(path: PathLike) -> None:
+    """Raise a FileError for a file that is missing, empty, a web page, …, without reading all of it."""
+    read_bytes(path, limit=256)
+
+
 def numbers(words: Sequence[bytes], path: PathLike, what: str) -> NDArray[np.float64]:
     """Return text words as float64 (N,); `what` is what they are, for the error."""
     try:

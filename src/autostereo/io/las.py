@@ -45,6 +45,8 @@ def load_las(path: PathLike) -> list[Points]:
         positions = np.stack([scan.x, scan.y, scan.z], axis=1)
     except (MemoryError, KeyboardInterrupt, SystemExit):
         raise
+    except laspy.errors.PointFormatNotSupported as error:
+        raise FileError(f"{path}: has points of format {error}, expected 0 to 10; damaged?") from None
     except BaseException as error:  # laspy raises many kinds, and a panic of lazrs is no Exception
         reason = " ".join(str(error).split())[:120]
         raise FileError(f"{path}: is damaged or truncated ({reason})") from error

@@ -94,7 +94,9 @@ def unit_colors(colors: NDArray, path: PathLike) -> NDArray[np.float64]:
     """
     values = np.asarray(colors, dtype=np.float64)[:, :3]
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
-    if not (low >= 0 and high <= 65535):  # also NaN
+    if bad := np.count_nonzero(np.isnan(values)):
+        raise FileError(f"{path}: expected colours in 0…1, 0…255 or 0…65535, found NaN in {bad:,} of {values.size:,}")
+    if not (low >= 0 and high <= 65535):
         raise FileError(f"{path}: expected colours in 0…1, 0…255 or 0…65535, found {low:g}…{high:g}")
     if high <= 1.001 and colors.dtype.kind not in "iu":
         return np.minimum(values, 1.0)

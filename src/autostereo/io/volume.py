@@ -1,4 +1,4 @@
-"""Volumes from medical and microscopy files: NRRD, NIfTI and MetaImage by SimpleITK, TIFF stacks by tifffile.
+"""Volumes from medical and microscopy files: NRRD, NIfTI and MetaImage by SimpleITK.
 
 World frame. NIfTI and NRRD files say where patient left, posterior and superior are; ITK turns every such file into
 one frame, LPS: x to the patient's left, y to posterior, z to superior (a NIfTI header itself is written for RAS: its
@@ -9,14 +9,11 @@ slice.
 
 from __future__ import annotations
 
-import gzip
-import logging
 import os
 import re
 import tempfile
-import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,7 +24,9 @@ from numpy.typing import NDArray
 from ..errors import DependencyError, FileError, InputError
 from ..scene.appearance import Vector, check_vector
 from ..scene.volume import Volume
-from .files import PathLike, read_bytes
+from .files import PathLike, check_start, read_bytes
+from .metaimage import checked_metaimage
+from .nifti import check_nifti
 
 TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
 
@@ -116,11 +115,6 @@ def make_volume(values: NDArray, hints: Hints, spacing: Any = (1.0, 1.0, 1.0), *
     return Volume(values, spacing=spacing, **place)
 
 
-def check_start(path: PathLike) -> None:
-    """Raise a FileError for a file that is missing, empty, a web page, …, without reading all of it."""
-    read_bytes(path, limit=256)
-
-
 def simpleitk(path: PathLike) -> Any:
     """Return SimpleITK, or say how to install it."""
     try:
@@ -175,9 +169,10 @@ def load_itk(path: PathLike, hints: Hints = NO_HINTS) -> list[Volume]:
     path = Path(path)
     check_start(path)
     sitk = simpleitk(path)
+    same = checked_metaimage if path.suffix.lower() in (".mha", ".mhd") else nullcontext
     try:
-        with silenced(sitk):
-            return [_read_itk(sitk, path, path, hints)]
+        with same(path) as header, silenced(sitk):
+            return [_read_itk(sitk, header, path, hints)]
     except RuntimeError as error:
         if "ScalarWithSpace" not in str(error):
             raise FileError(f"{path}: {_reason(path, error)}") from None
@@ -201,7 +196,7 @@ def _read_itk(sitk: Any, file: Path, path: Path, hints: Hints) -> Volume:
     frames = int(np.prod(size[3:]))
     frame = hints.choose(frames, path)
     if path.name.lower().endswith((".nii", ".nii.gz")):
-        _check_nifti(path, reader)
+        check_nifti(path, reader)
     if axes > 3:
         later = np.unravel_index(frame, size[3:], order="F")
         reader.SetExtractSize([*size[:3], *[0] * (axes - 3)])
@@ -223,57 +218,10 @@ def _is_anatomical(reader: Any) -> bool:
 def _reason(path: Path, error: Exception) -> str:
     """What is wrong with a file, from SimpleITK's error."""
     if "Unable to determine ImageIO reader" in str(error):
-        return f"is not a {path.suffix} file, damaged, or truncated"
-    if "MetaImage" in str(error):
-        found = re.search(rb"ElementDataFile\s*=\s*([^\r\n]+)", read_bytes(path))
-        name = found.group(1).decode("utf-8", "replace").strip() if found else "LOCAL"
-        if name.upper() != "LOCAL" and " " not in name and "%" not in name and not (path.parent / name).exists():
-            return f"needs {path.parent / name}, which does not exist"
-        return "is damaged or truncated: it holds less data than its header says"
+        return f"is not a {'.nii.gz' if path.suffix.lower() == '.gz' else path.suffix} file, damaged, or truncated"
+    if "determinant is 0" in str(error):
+        return "cannot use the directions of its axes, which are not independent"
     return f"cannot be read ({clean(error)})"
-
-
-def _check_nifti(path: Path, reader: Any) -> None:
-    """Refuse a truncated NIfTI file and one with NaN: ITK takes what is missing or not finite for zeros."""
-    start = int(float(reader.GetMetaData("vox_offset")))
-    bits = int(reader.GetMetaData("bitpix"))
-    wanted = start + int(np.prod(reader.GetSize())) * bits // 8
-    floats = int(reader.GetMetaData("datatype")) in (16, 64)
-    if not floats and _size_told(path) == wanted % 2**32:
-        return
-    found, bad = _scan(path, start, f"f{bits // 8}" if floats else None)
-    if found < wanted:
-        raise FileError(f"{path}: truncated: {wanted:,} bytes expected, found {found:,}")
-    if bad:
-        raise FileError(f"{path}: expected finite numbers, found NaN or infinity in {bad:,} voxels")
-
-
-def _size_told(path: Path) -> int:
-    """Bytes of a file once unpacked, modulo 2³², as a gzip file of one member says at its end."""
-    if path.suffix.lower() != ".gz":
-        return path.stat().st_size % 2**32
-    with open(path, "rb") as file:
-        file.seek(-4, os.SEEK_END)
-        return int.from_bytes(file.read(), "little")
-
-
-def _scan(path: Path, start: int, kind: str | None) -> tuple[int, int]:
-    """Bytes of a NIfTI file, as far as it can be unpacked, and how many numbers from `start` on are not finite."""
-    size = bad = 0
-    try:
-        with gzip.open(path) if path.suffix.lower() == ".gz" else open(path, "rb") as file:
-            head = file.read(start)
-            size = len(head)
-            order = "<" if head[:1] in (b"\x5c", b"\x1c") else ">"  # the low byte of the header's size, 348 or 540
-            dtype = np.dtype(order + (kind or "u1"))
-            while part := file.read(1 << 22):
-                size += len(part)
-                if kind:
-                    numbers = np.frombuffer(part, dtype, len(part) // dtype.itemsize)
-                    bad += int(np.count_nonzero(~np.isfinite(numbers)))
-    except (OSError, EOFError, zlib.error):
-        pass
-    return size, bad
 
 
 @contextmanager
@@ -295,72 +243,3 @@ def without_space(path: Path) -> Iterator[Path]:
         patched = Path(folder) / "header.nhdr"
         patched.write_text("\n".join(lines) + "\n\n", encoding="latin-1")
         yield patched
-
-
-# --- TIFF ----------------------------------------------------------------------------------------------------------
-def load_tiff(path: PathLike, hints: Hints = NO_HINTS) -> list[Volume]:
-    """Read a TIFF of several pages: x along a row, y downwards in the picture, z from page to page.
-
-    Spacing comes from OME or ImageJ metadata, else it is 1. Times and channels of a hyperstack are frames.
-
-    Raises
-    ------
-    DependencyError
-        tifffile is not installed, or the file's compression needs imagecodecs.
-    FileError
-        The file is missing, damaged, truncated, a single or coloured picture, or none of its frames is chosen.
-    """
-    check_start(path)
-    try:
-        import tifffile
-    except ImportError:
-        raise DependencyError(f"{path}: needs tifffile: pip install autostereo[volumes]") from None
-    log = logging.getLogger("tifffile")
-    was, log.disabled = log.disabled, True
-    try:
-        with tifffile.TiffFile(path) as tiff:
-            series = tiff.series[0]
-            array, axes = series.asarray(), series.axes
-            spacing = _tiff_spacing(tiff)
-            pages = len(tiff.pages)
-    except MemoryError:
-        raise
-    except Exception as error:  # tifffile and its decoders raise many kinds
-        if "imagecodecs" in str(error):
-            raise DependencyError(f"{path}: its compression needs imagecodecs: pip install imagecodecs") from None
-        reason = " ".join(str(error).split())[:160]
-        raise FileError(f"{path}: is damaged, truncated or not a TIFF ({reason})") from error
-    finally:
-        log.disabled = was
-    if "S" in axes:
-        raise FileError(f"{path}: is a picture in colour, expected one number a voxel")
-    if array.ndim < 3:
-        extra = f", followed by {pages - 1} of other sizes" if pages > 1 else ""
-        raise FileError(f"{path}: is one picture of {array.shape[-1]}×{array.shape[0]}{extra}, expected a stack")
-    others = [k for k, axis in enumerate(axes) if axis not in "YX"]
-    z = axes.index("Z") if "Z" in axes else others[-1]
-    frames = [k for k in others if k != z]
-    array = array.transpose([*frames, z, axes.index("Y"), axes.index("X")])
-    array = array.reshape(-1, *array.shape[-3:])
-    return [make_volume(array[hints.choose(len(array), path)], hints, spacing)]
-
-
-def _tiff_spacing(tiff: Any) -> Vector:
-    """Spacing along x, y, z: OME's physical sizes, else ImageJ's, else 1."""
-    if tiff.ome_metadata:
-        sizes = [re.search(rf'PhysicalSize{axis}="([^"]+)"', tiff.ome_metadata) for axis in "XYZ"]
-        x, y, z = (float(size.group(1)) if size else 0.0 for size in sizes)
-    elif tiff.imagej_metadata:
-        tags = tiff.pages[0].tags
-        x, y = (_pixel_size(tags.get(name)) for name in ("XResolution", "YResolution"))
-        z = float(tiff.imagej_metadata.get("spacing", 0.0))
-    else:
-        return 1.0, 1.0, 1.0
-    x = x if x > 0 else 1.0
-    return x, (y if y > 0 else x), (z if z > 0 else x)
-
-
-def _pixel_size(tag: Any) -> float:
-    """Units a pixel, from a tag of pixels a unit as a fraction; 0 if there is none."""
-    above, below = tag.value if tag is not None else (0, 1)
-    return below / above if above else 0.0

@@ -16,7 +16,7 @@ def check_vector(name: str, value: object) -> Vector:
     """Return three finite numbers as a tuple, or raise an error that names the field."""
     try:
         v = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name}: expected three numbers, got {value!r}") from None
     if v.shape != (3,) or not np.isfinite(v).all():
         raise InputError(f"{name}: expected three finite numbers, got {value!r}")
@@ -27,7 +27,10 @@ def check_number(name: str, value: object, low: float = -np.inf, high: float = n
     """Return a finite number within [low, high], or raise an error that names the field."""
     if isinstance(value, (bool, str, bytes, complex)) or not np.isscalar(value):
         raise InputError(f"{name}: expected a number, got {value!r}")
-    number = float(value)  # type: ignore[arg-type]
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except OverflowError:  # a whole number of hundreds of digits
+        number = np.inf
     if not np.isfinite(number) or not low <= number <= high:
         raise InputError(f"{name}: expected a finite number in [{low:g}, {high:g}], got {value!r}")
     return number

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+KIND = "autostereo transfer function"  # in files
 FAINT = 1e-280  # optical depths below this lose digits to underflow, and colour is no longer weighted by them
 
 
@@ -29,7 +30,7 @@ def _check_points(points: ArrayLike) -> Array:
     """Return control points as a checked (K, 5) float64 array, or raise an error that names what is wrong."""
     try:
         p = np.array(points, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError("transfer points: expected rows of five numbers (value, r, g, b, opacity)") from None
     if p.ndim != 2 or p.shape[1] != 5 or len(p) == 0:
         raise InputError(f"transfer points: expected rows (value, r, g, b, opacity), got shape {p.shape}")
@@ -270,7 +271,7 @@ class TransferFunction:
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write JSON: {"points": [[value, r, g, b, opacity], …]}."""
         rows = ",\n    ".join(json.dumps(row) for row in self.points.tolist())
-        text = f'{{\n  "type": "autostereo transfer function",\n  "points": [\n    {rows}\n  ]\n}}\n'
+        text = f'{{\n  "type": "{KIND}",\n  "points": [\n    {rows}\n  ]\n}}\n'
         return write_atomic(path, lambda file: file.write(text.encode()))
 
     @staticmethod
@@ -289,11 +290,20 @@ class TransferFunction:
             raise FileError(f"{path}: no such file") from None
         except OSError as error:
             raise FileError(f"{path}: cannot be read ({error.strerror or error})") from None
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise FileError(f"{path}: is not JSON ({error})") from None
-        points = data.get("points") if isinstance(data, dict) else data
+        fields = data if isinstance(data, dict) else {"points": data}
+        points = fields.get("points")
         if not isinstance(points, list):
             raise FileError(f'{path}: expected {{"points": [[value, r, g, b, opacity], …]}}')
+        if unknown := sorted(set(fields) - {"type", "points"}):
+            raise FileError(f"{path}: unknown fields {', '.join(unknown)}")
+        if (kind := fields.get("type", KIND)) != KIND:
+            raise FileError(f"{path}: expected the type {KIND!r}, found {str(kind)[:60]!r}")
+        for row in points:
+            for number in row if isinstance(row, list) else [row]:
+                if isinstance(number, bool) or not isinstance(number, int | float):
+                    raise FileError(f"{path}: transfer points: expected five numbers a row, found {str(number)[:60]!r}")
         try:
             return TransferFunction(points)  # type: ignore[arg-type]
         except InputError as error:

@@ -33,7 +33,7 @@ def suggest_points(values: NDArray, diagonal: float | None) -> NDArray[np.float6
         raise InputError("values: expected finite numbers, found NaN or infinity")
     lattice = float(np.linalg.norm(np.asarray(values.shape) - 1.0)) or 1.0
     diagonal = lattice if diagonal is None else check_number("diagonal", diagonal, np.finfo(float).tiny)
-    if low == high:
+    if high - low <= 512 * np.spacing(max(abs(low), abs(high))):  # no room for the edges of a histogram
         return np.array([(low, 0.8, 0.8, 0.8, 1 / diagonal)])
     stride = [max(1, -(-n // SIDE)) for n in values.shape]
     sample = values[:: stride[0], :: stride[1], :: stride[2]].astype(np.float64)

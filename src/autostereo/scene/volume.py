@@ -16,6 +16,7 @@ from .transfer import TransferFunction
 TYPES = ("uint8", "int8", "uint16", "int16", "float32", "float64")
 MODES = ("composite", "mip", "iso")
 GRADIENTS = ("central", "sobel")
+SMALLEST, LARGEST = 1e-30, 1e15  # of voxels, of coordinates (as Rig.frame takes them)
 
 
 def _check_values(values: object) -> NDArray:
@@ -131,6 +132,9 @@ class Volume:
         put(self, "transform", as_transform(self.transform))
         if not abs(np.linalg.det(self.transform[:3, :3])) > 0:
             raise InputError("transform: a volume cannot be flattened, the matrix is singular")
+        if not (self.voxel_size.min() >= SMALLEST and np.abs(self.corners).max() <= LARGEST):
+            sizes = " × ".join(f"{x:g}" for x in self.voxel_size)
+            raise InputError(f"spacing: expected voxels of {SMALLEST:g} and more within ±{LARGEST:g}, got {sizes}")
         for name, choices in (("mode", MODES), ("gradient", GRADIENTS)):
             if getattr(self, name) not in choices:
                 raise InputError(f"{name}: expected one of {', '.join(choices)}, got {getattr(self, name)!r}")
@@ -196,7 +200,7 @@ class Volume:
 
     # --- values ----------------------------------------------------------------------------------------------------
     def histogram(self, bins: int = 256) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Count the voxels in `bins` equal parts of `value_range`.
+        """Count the voxels in `bins` equal parts of `value_range`; of a wider one where it is a few roundings wide.
 
         Returns
         -------
@@ -214,8 +218,11 @@ class Volume:
             counts, edges = np.histogram(value, bins, range=self.value_range, weights=each)  # type: ignore[arg-type]
             return counts.astype(np.int64), edges
         total = np.zeros(bins, dtype=np.int64)
+        low, high = self.value_range
+        least = 2 * bins * float(np.spacing(self.values.dtype.type(max(abs(low), abs(high)))))
+        wider = 0.0 if high - low > least else max(least, 0.5 * (low == high))
         for part in self.values:
-            counts, edges = np.histogram(part, bins, range=self.value_range)
+            counts, edges = np.histogram(part, bins, range=(low - wider, high + wider))
             total += counts
         return total, edges
 

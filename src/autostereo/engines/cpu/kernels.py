@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ...scene.scene import Scene
+from ...scene.volume import Volume
 from ...viewmap import ViewMap
 from ..options import Options
 
@@ -20,17 +21,25 @@ def is_woven(viewmap: ViewMap, options: Options) -> bool:
     return few and options.sampling == "pixel" and options.alpha == "exact"
 
 
-def kernels_for(scene: Scene, viewmap: ViewMap | None, options: Options) -> tuple[str, ...]:
+def kernels_for(
+    scene: Scene, viewmap: ViewMap | None, options: Options, method: str = "single-pass", views: int = 2
+) -> tuple[str, ...]:
     """Names of the kernels that draw a scene to a panel, or to views if there is no view map; see jit.is_compiled."""
-    drawn = [type(item).__name__ for item in scene.objects]
-    volume = ("draw_rows", "draw_panel_rays")
-    if drawn == ["Volume"] and options.volume == "shared":
-        woven = viewmap is not None and is_woven(viewmap, options)
-        joined = viewmap is not None and is_joined(viewmap, options)
-        volume = ("draw_shared_rows", volume[1] if joined else "draw_woven_rows" if woven else "draw_panel_rows")
-    names = {
-        "Mesh": ("draw_views", "draw_panel"),
-        "Points": ("splat_views", "splat_panel"),
-        "Volume": volume,
-    }
-    return tuple(f"{names[kind][viewmap is not None]}-" for kind in sorted(set(drawn)))  # "-": the whole name
+    panel = viewmap if method == "single-pass" else None
+    together = method == "single-pass" and (views > 1 or panel is not None)
+    kinds = {type(item).__name__ for item in scene.objects}
+    names = {"draw_views" if panel is None else "draw_panel"} if "Mesh" in kinds else set()
+    if "Points" in kinds:
+        names.add("splat_views" if panel is None else "splat_panel")
+    modes = [item.mode for item in scene.objects if isinstance(item, Volume)]
+    depth = kinds != {"Volume"} or "iso" in modes or method == "dibr" or (options.depth and panel is None)
+    joined = panel is not None and is_joined(panel, options)
+    if options.volume == "shared" and modes.count("composite") == 1 and together and not depth and not joined:
+        modes.remove("composite")
+        woven = panel is not None and is_woven(panel, options)
+        names.add("draw_shared_rows" if panel is None else "draw_woven_rows" if woven else "draw_panel_rows")
+    if modes:
+        names.add("draw_rows" if panel is None else "draw_panel_rays")
+    if method == "dibr":
+        names.add("warp_rows")
+    return tuple(f"{name}-" for name in sorted(names))  # "-": the whole name
