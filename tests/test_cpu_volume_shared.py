@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import autostereo as aus
 from autostereo.engines.cpu import volume, volume_cut
 from autostereo.engines.cpu.volume_plan import view_groups
-from autostereo.engines.cpu.volume_setup import PLAIN, TABLE, is_sharp, make_plain, make_table, prepare_field
+from autostereo.engines.cpu.volume_setup import PLAIN, TABLE, face_range, is_sharp, make_plain, make_table
 from autostereo.scene import samples
 from test_cpu_volume_basics import psnr
 
@@ -158,7 +158,7 @@ SHARP = {
 def test_edges_are_as_sharp_as_those_of_rays_of_their_own(name: str) -> None:
     """In the outermost views too, beside which the middle one shows by how far they would be blurred."""
     scene, rig = SHARP[name], CLOSE.with_views(9)
-    assert is_sharp(prepare_field(scene, False))
+    assert is_sharp(scene, face_range(scene))
     exact = aus.Options(volume="exact", shading="center")
     found = aus.render_views(scene, rig, (160, 120), engine="cpu").color
     expected = aus.render_views(scene, rig, (160, 120), engine="cpu", options=exact).color
@@ -173,7 +173,8 @@ def test_edges_are_as_sharp_as_those_of_rays_of_their_own(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["shells", "engine_part", "hydrogen_orbital", "c60_density"])
 def test_most_volumes_have_no_sharp_edges(name: str) -> None:
-    assert not is_sharp(prepare_field(getattr(samples, name)(), False))
+    volume = getattr(samples, name)()
+    assert not is_sharp(volume, face_range(volume))
 
 
 def test_edges_are_drawn_over_what_is_behind_them() -> None:

@@ -25,19 +25,27 @@ def kernels_for(
     scene: Scene, viewmap: ViewMap | None, options: Options, method: str = "single-pass", views: int = 2
 ) -> tuple[str, ...]:
     """Names of the kernels that draw a scene to a panel, or to views if there is no view map; see jit.is_compiled."""
+    from .volume_setup import face_range, is_sharp
+
     panel = viewmap if method == "single-pass" else None
     together = method == "single-pass" and (views > 1 or panel is not None)
     kinds = {type(item).__name__ for item in scene.objects}
     names = {"draw_views" if panel is None else "draw_panel"} if "Mesh" in kinds else set()
     if "Points" in kinds:
         names.add("splat_views" if panel is None else "splat_panel")
-    modes = [item.mode for item in scene.objects if isinstance(item, Volume)]
+    volumes = [item for item in scene.objects if isinstance(item, Volume)]
+    modes = [item.mode for item in volumes]
     depth = kinds != {"Volume"} or "iso" in modes or method == "dibr" or (options.depth and panel is None)
     joined = panel is not None and is_joined(panel, options)
     if options.volume == "shared" and modes.count("composite") == 1 and together and not depth and not joined:
-        modes.remove("composite")
-        woven = panel is not None and is_woven(panel, options)
-        names.add("draw_shared_rows" if panel is None else "draw_woven_rows" if woven else "draw_panel_rows")
+        volume = volumes[modes.index("composite")]
+        sharp = is_sharp(volume, face_range(volume))
+        if panel is None or not sharp:
+            modes.remove("composite")
+            woven = panel is not None and is_woven(panel, options)
+            names.add("draw_shared_rows" if panel is None else "draw_woven_rows" if woven else "draw_panel_rows")
+            if sharp:
+                names.add("draw_edges")
     if modes:
         names.add("draw_rows" if panel is None else "draw_panel_rays")
     if method == "dibr":

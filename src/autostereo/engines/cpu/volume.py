@@ -34,7 +34,6 @@ from .volume_panel import PIXEL_ROWS, draw_panel_rays, draw_panel_rows
 from .volume_plan import SLIDE, can_share, plan_bundles, share_slices, shared_reach
 from .volume_rays import BLOCK_ROWS, RAYS, ROW
 from .volume_sample import SLABS, Cut
-from .volume_setup import is_sharp
 from .volume_shared import LINE, SLAB_ROWS, SPAN, Shared
 from .volume_views import Ways, draw_rows, draw_shared_rows, draw_woven_rows
 
@@ -153,7 +152,7 @@ def _draw_shared(
     )
 
     edges = None
-    if draw.viewmap is None and is_sharp(prepared.fields[index]):
+    if draw.viewmap is None and prepared.is_sharp(index):
         edges = edge_task(cut, ways, samples, draw, slices, color, memory)
 
     def task(first: int, end: int) -> None:
@@ -195,7 +194,7 @@ def draw_volume_panel(
     woven = is_woven(draw.viewmap, options)
     for group in volume_groups(prepared, opaque):
         shared = may_share and is_shared(prepared, group, options)
-        shared = shared and not is_sharp(prepared.fields[group[0]])
+        shared = shared and not prepared.is_sharp(group[0])
         if shared and woven:
             _draw_shared(prepared, group[0], draw, slices, color, memory)
             continue

@@ -19,7 +19,17 @@ from .scene_arrays import light_array
 from .volume_modes import LEVELS
 from .volume_rays import BLOCK_ROWS, ROW
 from .volume_sample import CHUNK, LIST, LIST_ROWS, Cut, Planes
-from .volume_setup import BLOCK, TABLE, Field, make_plain, make_table, prepare_field, shown_blocks, table_range
+from .volume_setup import (
+    BLOCK,
+    TABLE,
+    Field,
+    is_sharp,
+    make_plain,
+    make_table,
+    prepare_field,
+    shown_blocks,
+    table_range,
+)
 from .volume_views import ISO, MIP, Ways
 
 MODES = ("composite", "mip", "iso")  # in the order of volume_views
@@ -37,6 +47,10 @@ class PreparedVolumes:
     def volumes(self) -> list[Volume]:
         """The volumes themselves."""
         return [f.volume for f in self.fields]
+
+    def is_sharp(self, index: int) -> bool:
+        """Whether a volume makes sharp edges; see volume_setup.is_sharp."""
+        return is_sharp(self.fields[index].volume, self.fields[index].faces)
 
 
 def prepare_volumes(scene: Scene, volumes: list[Volume]) -> PreparedVolumes:

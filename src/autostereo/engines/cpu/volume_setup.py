@@ -45,7 +45,7 @@ class Grid(NamedTuple):
 class Field(NamedTuple):
     """A prepared volume: what it is, its grid, (2, …) block ranges, the value of stored scalar 0 and of one step.
 
-    faces: least and greatest value on the six faces of the box.
+    faces: see face_range.
     """
 
     volume: Volume
@@ -193,9 +193,7 @@ def prepare_field(volume: Volume, wide: bool) -> Field:
         args = (scalars, shape, volume.gradient == "sobel", matrix, steepest)
         run_rows(volume.values.shape[0], lambda first, last: store_gradients(*args, first, last, words), 2)
     grid = Grid(scalars, words, shape, (low - first_value) / value_step, (high - first_value) / value_step)
-    faces = [np.take(values, k, axis) for axis in range(3) for k in (0, -1)]
-    ends = (min(float(face.min()) for face in faces), max(float(face.max()) for face in faces))
-    return Field(volume, grid, blocks, first_value, value_step, ends)
+    return Field(volume, grid, blocks, first_value, value_step, face_range(volume))
 
 
 # --- classification ------------------------------------------------------------------------------------------------
@@ -212,9 +210,18 @@ def table_range(volume: Volume) -> tuple[float, float]:
     return (first, last) if first < last else (low, high)
 
 
-def is_sharp(field: Field) -> bool:
-    """Whether pictures have sharp edges: voxels jump from a scalar to the next but one, or are cut where opaque."""
-    volume, (low, high) = field.volume, field.faces
+def face_range(volume: Volume) -> tuple[float, float]:
+    """Least and greatest value on the six faces of a volume's box."""
+    faces = [np.take(volume.values, k, axis) for axis in range(3) for k in (0, -1)]
+    return min(float(face.min()) for face in faces), max(float(face.max()) for face in faces)
+
+
+def is_sharp(volume: Volume, faces: tuple[float, float]) -> bool:
+    """Whether pictures have sharp edges: voxels jump from a scalar to the next but one, or are cut where opaque.
+
+    faces: what face_range found.
+    """
+    low, high = faces
     if volume.clip_box is not None or volume.clip_plane is not None:
         low, high = volume.value_range
     scalars = np.linspace(*table_range(volume), TABLE)
