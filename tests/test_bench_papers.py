@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from autostereo.cli.benchmarks import harness, papers, papers_plane, papers_published, report, suite, workloads
+from autostereo.cli.benchmarks.papers_published import BUCKY, NEGHIP
 from autostereo.cli.benchmarks.papers_studio import PapersStudio, Way, on_cpu
 from autostereo.cli.benchmarks.suite import BenchOptions, Work
 from autostereo.display.display import Display
@@ -295,3 +296,19 @@ def test_references_are_read_back_nevertheless():
 def test_cpu_columns_are_drawn_by_the_cpu():
     way = on_cpu(Way("x", SIZE, workloads.rig_for(Scene((icosphere(1),)), 2, SIZE), "geometry-shader"))
     assert (way.name, way.engine, way.method) == ("cpu engine", "cpu", "single-pass")
+
+
+RAW = [(BUCKY, "Bucky.raw", 32), (NEGHIP, "neghip_64x64x64_uint8.raw", 64)]
+
+
+@pytest.mark.parametrize(("name", "file", "side"), RAW)
+def test_raw_data_of_the_papers_is_read(tmp_path, name, file, side):
+    """What has no header is of the paper's size; without the file there is a stand-in."""
+    from autostereo.cli.benchmarks.papers_volume import volume_scene
+
+    studio = PapersStudio(BenchOptions(data=tmp_path), silent)
+    assert "stand-in" in volume_scene(studio, name)[1]
+    (tmp_path / "volumes").mkdir()
+    np.arange(side**3, dtype=np.uint8).tofile(tmp_path / "volumes" / file)
+    scene, words = volume_scene(studio, name)
+    assert words == f"data: {file}" and scene.objects[0].shape == (side,) * 3

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from ...display.display import Display
 from ...engines.options import Options
@@ -34,7 +35,7 @@ from .volume import psnr
 
 DATA: dict[str, tuple[str, int, Callable[[int], Volume]]] = {  # file in DIR/volumes, voxels a side, stand-in
     BUCKY: ("Bucky.raw", 32, samples.c60_density),
-    NEGHIP: ("neghip.json", 64, samples.shells),
+    NEGHIP: ("neghip_64x64x64_uint8.raw", 64, samples.shells),
     HYDROGEN: ("hydrogen.vti", 128, samples.hydrogen_orbital),
     ENGINE: ("engine.nii.gz", 256, samples.engine_part),
     SKULL: ("bonsai.nii.gz", 256, samples.shells),
@@ -54,9 +55,9 @@ def volume_scene(studio: PapersStudio, name: str) -> tuple[Scene, str]:
     folder = studio.options.data
     if folder is not None and not studio.options.quick:
         path = folder / "volumes" / file
-        if path.is_file() and path.suffix != ".raw":
-            scene = load(path)
-            return scene, f"data: {path.name}"
+        if path.is_file():
+            hints: dict[str, Any] = {"shape": (side,) * 3, "dtype": "uint8"} if path.suffix == ".raw" else {}
+            return load(path, **hints), f"data: {path.name}"
     voxels = max(32, side // studio.options.divisor)
     return Scene((stand_in(voxels),)), f"data: stand-in {stand_in.__name__}({voxels})"
 
