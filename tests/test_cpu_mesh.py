@@ -166,3 +166,22 @@ def test_cost_of_a_continuous_panel_has_no_view_count_in_it():
         rig = aus.Rig(baseline=1.2 * (views - 1) / views)
         pictures.append(aus.render(scene, display, rig, engine="cpu").pixels.astype(int))
     assert (pictures[0] != pictures[1]).mean() < 0.002  # float32 offsets differ in the last bit
+
+
+def test_what_lies_beyond_the_last_bin_is_a_triangle(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of memory that nothing was written to no triangle may be read, not even where the first thousands are culled."""
+    from autostereo.engines.cpu.memory import Memory
+
+    def poisoned(self: Memory, name: str, shape: tuple[int, ...], dtype: type) -> np.ndarray:
+        return np.frombuffer(b"\x71" * int(np.prod(shape) * np.dtype(dtype).itemsize), dtype).reshape(shape).copy()
+
+    ball = shapes.icosphere(5)
+    behind = replace(ball, transform=aus.transforms.translation(30, 0, 0))  # beside what is seen
+    rig = aus.Rig(position=(0, 0, 3), views=3, baseline=0.5)
+    display = aus.Display.wavelength_selective(96, 64)
+    expected = aus.render_views(aus.Scene((ball,)), rig, (96, 64), engine="cpu").color
+    panel = aus.render(aus.Scene((ball,)), display, rig.with_views(8), engine="cpu").pixels
+    monkeypatch.setattr(Memory, "buffer", poisoned)
+    scene = aus.Scene((behind, ball))
+    assert np.array_equal(aus.render_views(scene, rig, (96, 64), engine="cpu").color, expected)
+    assert np.array_equal(aus.render(scene, display, rig.with_views(8), engine="cpu").pixels, panel)

@@ -282,11 +282,12 @@ def _binned(
     np.cumsum(counts.sum(axis=0), out=bin_start[1:])
     cursors = bin_start[:-1] + np.cumsum(counts, axis=0) - counts
     binned = memory.buffer("bins", (int(bin_start[-1]) + LANES,), np.int32)
-    binned[-LANES:] = 0  # the last bin is read in whole steps
 
     def fill(first: int, last: int) -> None:
         for c in range(first, last):
             fill_bins(edges[c], kept[c], triangles, bins[2], bins[3], cursors[c], binned)
 
     run_rows(chunks, fill, 1)
+    if len(binned) > LANES:  # the last bin is read in whole steps, of triangles that there are
+        binned[-LANES:] = binned[-LANES - 1]
     return triangles, bin_start, binned
