@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from .jit import inlined, kernel
-from .volume_rays import END, LENGTH, ONE, ORIGIN, RAYS, TURN, B, G, R, T
-from .volume_views import mark_volumes, over, trace_rays
+from .volume_rays import END, RAYS
+from .volume_views import finish_rays, mark_volumes, start_rays, trace_rays
 
 JUMP = 6  # of 255: what two neighbours differ by at an edge
 
@@ -46,7 +46,7 @@ def draw_edges(rows, cuts, camera, slices, ways, offsets, planes, scratch, behin
     """
     rays, packed, jumps, chosen = scratch
     width = color.shape[2]
-    far = np.float32(slices.first + slices.slabs * slices.distance)
+    far, one = np.float32(slices.first + slices.slabs * slices.distance), np.uint64(1)
     for r in range(rows[0], rows[1]):
         row = ((camera.centre_y - (r + 0.5)) / camera.fy - camera.offset_y / camera.focal, camera.offset_y)
         count = find_edges(color[:, r], jumps, chosen)
@@ -55,18 +55,11 @@ def draw_edges(rows, cuts, camera, slices, ways, offsets, planes, scratch, behin
         for first in range(0, count, RAYS):
             for i in range(RAYS):
                 v, x = divmod(chosen[min(first + i, count - 1)], width)
-                turn = (x + 0.5 - camera.centre_x) / camera.fx - offsets[v] / camera.focal
-                k = np.uint64(i)
-                rays[ORIGIN + k] = np.float32(offsets[v])
-                rays[TURN + k] = np.float32(turn)
-                rays[LENGTH + k] = np.float32(np.sqrt(1.0 + row[0] * row[0] + turn * turn))
-                rays[END + k] = far
+                start_rays(one, np.uint64(i), x, offsets[v], camera, row, rays)
+                rays[END + np.uint64(i)] = far
             trace_rays(cuts, row, slices, ways, False, False, planes, rays, packed)
             for i in range(min(count - first, RAYS)):
                 v, x = divmod(chosen[first + i], width)
-                k = np.uint64(i)
-                through, under = rays[T + k], behind[v, r - rows[0], x]
-                color[v, r, x, 0] = over(rays[R + k], through, under[0])
-                color[v, r, x, 1] = over(rays[G + k], through, under[1])
-                color[v, r, x, 2] = over(rays[B + k], through, under[2])
-                color[v, r, x, 3] = over(ONE - through, through, under[3])
+                for c in range(4):
+                    color[v, r, x, c] = behind[v, r - rows[0], x, c]
+                finish_rays(one, np.uint64(i), rays, color[v, r, x : x + 1])
