@@ -148,7 +148,7 @@ def by_channels(job: Job, stages: list[Stage]) -> bool:
     draw = job.draw
     assert draw.viewmap is not None
     if draw.method != "single-pass":
-        return draw.method == "covering-quad" or draw.method.startswith("plane-rasterizer")
+        return draw.method == "covering-quad"
     if draw.viewmap.continuous or not stages:
         return True
     views = VIEW_PIXEL * len(draw.offsets) * draw.camera.width * draw.camera.height
@@ -162,7 +162,8 @@ def draw_panel(job: Job, stages: list[Stage], target: Target) -> None:
     size = camera.width, camera.height
     over = [stage for stage in stages if stage.draws_over(job)]
     under = [stage for stage in stages if stage not in over]
-    panel = job.kept.get("panel", (size, bool(over)), lambda: Panel(job.device, size, bool(over)))
+    with_depth = bool(over) and len(stages) > 1  # one kind of objects hides itself
+    panel = job.kept.get("panel", (size, with_depth), lambda: Panel(job.device, size, with_depth))
     if job.draw.method == "n-pass-subres":
         _weave_small(job, stages, panel)
     else:

@@ -16,9 +16,10 @@ from .job import Job
 from .mesh_buffers import Part
 
 BLOCK_VIEWS = 4  # views of a tile (PMR 2020, section 4: 4×4×4 voxels)
+PANEL_BLOCKS = 8  # of a panel, whose tiles hold sub-pixels; but BLOCK_VIEWS at least in each
 MAX_BLOCKS = 256  # of a pass: 8 bits of an entry
 MAX_SIDE = 4 * 2**12  # pixels of a picture: 12 bits of an entry for its tiles
-MAX_TRIANGLES = 2**20  # set up at a time; near clipping may double them
+MAX_TRIANGLES = 2**21  # set up at a time; near clipping may double them
 MAX_SAMPLES = 2**25  # voxels, or sub-pixels, of a round
 MAX_ENTRIES = 2**24  # in the queue
 TRIANGLE_TEXELS = 4  # of lib/plane_triangle.glsl
@@ -86,22 +87,36 @@ def chunks(parts: Sequence[Part], most: int) -> list[list[Piece]]:
 
 
 class Queue:
-    """Tiles to be rasterised, and the counts of a pass; as large as the frame before would have needed."""
+    """Tiles to be rasterised, and the counts of a pass; as large as the frame before would have needed.
+
+    Attributes
+    ----------
+    most : int
+        Triangles of a piece of the scene, so few that their tiles find room.
+    """
 
     def __init__(self, device: Device) -> None:
         self._device = device
         self.counters = device.ctx.buffer(bytes(COUNTERS))
+        self.most = MAX_TRIANGLES
         self._make(FIRST_ROOM)
 
     def _make(self, room: int) -> None:
         self.room, self.entries = room, Memory(self._device, room, 4, "u4")
 
-    def grow(self) -> None:
-        """Make room for what was asked for, and a quarter more; called when the frame before is long finished."""
+    def grow(self, triangles: int) -> None:
+        """Make room for what was asked for, and a quarter more, or smaller pieces of a scene of so many triangles.
+
+        Called when the frame before is long finished.
+        """
         wanted = int(np.frombuffer(self.counters.read(16), np.uint32)[3])
         self.counters.write(bytes(4), 12)
         if self.room < min(wanted, MAX_ENTRIES):
             self._make(min(wanted + wanted // 4, MAX_ENTRIES))
+        if wanted > MAX_ENTRIES:
+            self.most = max(1, int(min(self.most, triangles) * 0.8 * MAX_ENTRIES / wanted))
+        elif 0 < 4 * wanted < MAX_ENTRIES:
+            self.most = min(2 * self.most, MAX_TRIANGLES)
 
 
 class Voxels:
@@ -109,15 +124,28 @@ class Voxels:
 
     def __init__(self, device: Device, samples: int) -> None:
         self.depths, self.winners = (Memory(device, samples, 1, "u4") for _ in range(2))
-        self._blank = device.ctx.buffer(b"\xff" * (4 * MEMORY_WIDTH * BLANK_ROWS))
 
-    def clear(self) -> None:
-        """Nothing seen: all bits set, greater than any depth or number."""
+        self._blank = None if device.is_hardware else device.ctx.buffer(b"\xff" * (4 * MEMORY_WIDTH * BLANK_ROWS))
+
+    def bind(self) -> None:
+        """Bind both to their image units."""
+        self.depths.bind(2)
+        self.winners.bind(3)
+
+    def clear(self) -> bool:
+        """Set all bits, greater than any depth or number, if that is done by copying.
+
+        Software devices copy several times faster than their shaders write; GPUs copy to textures at a hundredth of
+        their memory's speed.
+        """
+        if self._blank is None:
+            return False
         for memory in (self.depths, self.winners):
             height = memory.texture.height
             for first in range(0, height, BLANK_ROWS):
                 box = (0, first, MEMORY_WIDTH, min(BLANK_ROWS, height - first))
                 memory.texture.write(self._blank, box)
+        return True
 
 
 class Corners:

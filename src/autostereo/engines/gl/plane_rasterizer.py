@@ -4,15 +4,14 @@ A triangle is set up once for all views and rasterised in the space of column, r
 
     vertices → setup → tiles → fine rasteriser, twice → pixel encoding
 
-`setup` clips, snaps, culls; `tiles` finds the blocks of 4×4 pixels × 4 views that a triangle may touch; the fine one
+`setup` clips, snaps, culls; `tiles` finds the blocks of 4×4 pixels × 4 views that a triangle covers; the fine one
 leaves in every voxel the least depth, then the first triangle of that depth; `encode` shades what is seen and writes it
-to tiles of views, or of the channels of a panel (lib/plane_triangle.glsl, lib/plane_tile.glsl, plane_*.comp,
-plane_encode.frag).
+to tiles of views, or to a panel (lib/plane_triangle.glsl, lib/plane_tile.glsl, plane_*.comp).
 For a panel, depths and winners are kept per sub-pixel: each shows one camera, and no other voxel is looked at.
 
 Nothing is read back in between: dispatches take their size from the counts of the stage before. A tile that finds no
-room in the queue is rasterised where it was found; the queue is made larger for the next frame. Pictures that are too
-large for a buffer are drawn in rounds of some rows, scenes in rounds of some triangles.
+room in the queue is rasterised where it was found; for the next frame the queue is made larger, or the scene cut into
+pieces. Pictures that are too large for a buffer are drawn in rounds of some rows.
 
 METHODS are variants: one pass; the same pipeline run with one view after the other; planes as the paper prints them,
 for comparison; triangles that begin with different views (section 4.3).
@@ -31,11 +30,13 @@ import numpy as np
 from ...errors import UnsupportedError
 from .job import Job
 from .mesh import Meshes, set_material, switches
+from .panel import Panel
 from .plane_buffers import (
     BLOCK_VIEWS,
     MAX_BLOCKS,
     MAX_SIDE,
     MAX_TRIANGLES,
+    PANEL_BLOCKS,
     TRIANGLE_TEXELS,
     Corners,
     Memory,
@@ -51,9 +52,10 @@ from .programs import Defines
 
 METHODS = ("plane-rasterizer", "plane-rasterizer-n-pass", "plane-rasterizer-planar", "plane-rasterizer-staggered")
 VERSION = 430  # compute shaders and storage buffers
-# of GL: SHADER_STORAGE, SHADER_IMAGE_ACCESS, COMMAND, BUFFER_UPDATE, and TEXTURE_UPDATE for what clears voxels
-BARRIERS = 0x2000 | 0x20 | 0x40 | 0x200 | 0x100
+# SHADER_STORAGE, SHADER_IMAGE_ACCESS, COMMAND, BUFFER_UPDATE, TEXTURE_UPDATE; TEXTURE_FETCH, FRAMEBUFFER for pictures
+BARRIERS = 0x2000 | 0x20 | 0x40 | 0x200 | 0x100 | 0x8 | 0x400
 GROUP = 64  # invocations of a work group
+CHANNELS = 3
 GROUPS = 65535  # work groups in one direction, as many as every device has
 STAGES = ("clear", "vertices", "setup", "tiles", "depth", "winner", "encode")
 
@@ -97,6 +99,10 @@ class Pass:
 class PlaneMeshes(Meshes):
     """The meshes of a scene, also by the methods here; a stage (engine.py)."""
 
+    def draws_over(self, job: Job) -> bool:
+        """On panels by the methods here, which draw nothing but meshes: their sub-pixels need no tiles."""
+        return job.draw.method in METHODS
+
     def draw_views(self, job: Job, tiles: range) -> None:
         """Draw the views of these tiles."""
         if job.draw.method in METHODS:
@@ -104,35 +110,38 @@ class PlaneMeshes(Meshes):
         else:
             super().draw_views(job, tiles)
 
-    def draw_channels(self, job: Job) -> None:
-        """Draw the sub-pixels of a panel, each channel into its tile."""
-        if job.draw.method in METHODS:
-            Drawing(job, self._parts).channels()
-        else:
-            super().draw_channels(job)
+    def draw_panel(self, job: Job, panel: Panel) -> None:
+        """Draw the sub-pixels of a panel."""
+        Drawing(job, self._parts).panel(panel)
 
 
 class Drawing:
-    """One draw of meshes into the tiles of the job's atlas."""
+    """One draw of meshes into the tiles of the job's atlas, or into a panel."""
 
     def __init__(self, job: Job, parts: list[Any]) -> None:
         job.device.require(VERSION, f"method {job.draw.method!r}")
         check_size(job)
         self.job, self.parts = job, parts
         kept, device = job.kept, job.device
-        self.chunks = chunks(parts, MAX_TRIANGLES)
         self.numbers = np.cumsum([0, *(part.triangles for part in parts)])
-        self.room = room = 2 * max(sum(piece[2] for piece in chunk) for chunk in self.chunks)
-        self.triangles = kept.get("plane triangles", room, lambda: Memory(device, TRIANGLE_TEXELS * room, 4, "u4"))
+        count = int(self.numbers[-1])
         self.queue = kept.get("plane queue", None, lambda: Queue(device))
+        self.queue.grow(count)
+        self.chunks = chunks(parts, self.queue.most)
+        self.room = room = 2 * min(count, MAX_TRIANGLES)
+        self.triangles = kept.get("plane triangles", room, lambda: Memory(device, TRIANGLE_TEXELS * room, 4, "u4"))
         self.corners = kept.get("plane corners", None, self._send_corners)
         self.one_view = job.draw.method == "plane-rasterizer-n-pass"
-        self.size = 1 if self.one_view else BLOCK_VIEWS
+        self.on_panel = job.columns is not None
+        self.size = self._views_of_a_block()
         self.blocks, self.block_texture = upload_blocks(job, self.size)
-        self.panel = job.columns is not None
         self.sample_at = (*(job.columns or (0.5, 0.5, 0.5)), job.row)
-        self.views_in_all = len(job.draw.offsets) if self.panel else job.count
-        self.queue.grow()
+        self.views_in_all = len(job.draw.offsets) if self.on_panel else job.count
+
+    def _views_of_a_block(self) -> int:
+        if self.one_view:
+            return 1
+        return max(BLOCK_VIEWS, len(self.job.draw.offsets) // PANEL_BLOCKS) if self.on_panel else BLOCK_VIEWS
 
     def _send_corners(self) -> list[Corners]:
         result = []
@@ -149,23 +158,24 @@ class Drawing:
 
     def views(self) -> None:
         """Draw all views of the atlas."""
-        layout = self.job.atlas.layout
+        layout, atlas = self.job.atlas.layout, self.job.atlas
         for views in self._passes():
             tiles = range(views.first * self.size, min((views.first + views.count) * self.size, self.job.count))
             for part in rounds((layout.width, layout.height), len(tiles), 0):
                 self._clear(part)
                 self._raster(part, views)
-                self._encode(part, tiles)
+                self._encode(part, tiles.start, atlas.color)
+                if self.job.draw.options.depth:
+                    self._write_depths(part, tiles)
 
-    def channels(self) -> None:
-        """Draw the sub-pixels of the atlas's channels."""
-        layout, count = self.job.atlas.layout, self.job.count
-        for part in rounds((layout.width, layout.height), count, len(self.blocks)):
+    def panel(self, panel: Panel) -> None:
+        """Draw the sub-pixels of a panel."""
+        for part in rounds(panel.size, CHANNELS, len(self.blocks)):
             self._clear(part)
             self._show(part)
             for views in self._passes():
                 self._raster(part, views)
-            self._encode(part, range(count))
+            self._encode(part, 0, panel.color)
 
     def _passes(self) -> Iterator[Pass]:
         step = 1 if self.one_view else MAX_BLOCKS
@@ -178,17 +188,19 @@ class Drawing:
     def _clear(self, part: Round) -> None:
         samples = 16 * part.tiles * part.planes
         voxels = self.job.kept.get("plane voxels", samples, lambda: Voxels(self.job.device, samples))
+        voxels.bind()
         with _stage(self.job, "clear"):
-            voxels.clear()
-        voxels.depths.bind(2)
-        voxels.winners.bind(3)
+            if not voxels.clear():
+                program = self.job.program("plane_clear.comp", version=VERSION)
+                _set(program, count=samples)
+                _run(program, samples)
         self.triangles.bind(0)
         self.queue.counters.bind_to_storage_buffer(0)
 
     def _show(self, part: Round) -> None:
         """What the panel's tiles show; made once for a panel that needs one round."""
         job, draw = self.job, self.job.draw
-        key = (draw.viewmap, part, draw.flip_x, draw.flip_y, draw.offsets.tobytes(), job.first, self.size)
+        key = (draw.viewmap, part, draw.flip_x, draw.flip_y, draw.offsets.tobytes(), self.size)
         shown, offsets = job.kept.get("plane shown", key, lambda: self._find_shown(part))
         shown.bind(4)
         offsets.bind(5)
@@ -200,7 +212,7 @@ class Drawing:
         shown.bind(4)
         offsets.bind(5)
         program = job.masked_program("plane_shown.comp", version=VERSION)
-        _set(program, picture=(part.width, part.rows), first_row=part.first_row, planes=(job.first, part.planes))
+        _set(program, picture=(part.width, part.rows), first_row=part.first_row)
         _set(program, grouping=(self.size, len(self.blocks)))
         _run(program, part.tiles)
         device.ctx.memory_barrier(BARRIERS)
@@ -210,13 +222,12 @@ class Drawing:
         """Depths and winners of a pass; the queue is filled once if the scene is not cut into pieces."""
         for find_depth in (True, False):
             for chunk in self.chunks:
-                known = not find_depth and len(self.chunks) == 1
-                if not known:
+                if find_depth or len(self.chunks) > 1:
                     self._set_up(part, views, chunk)
                     self._find_tiles(part, views, find_depth)
                 with _stage(self.job, "depth" if find_depth else "winner"):
                     fine = self._program("plane_fine.comp", part, views)
-                    _set(fine, find_depth=find_depth, known=known, room=self.queue.room)
+                    _set(fine, find_depth=find_depth, room=self.queue.room)
                     fine.run_indirect(self.queue.counters, 4 * (8 + 6))
                 if not find_depth:
                     self._find_tiles(part, views, find_depth, repeat=True)
@@ -263,42 +274,55 @@ class Drawing:
     def _program(self, name: str, part: Round, views: Pass) -> Any:
         method = self.job.draw.method
         defines: Defines = {
-            "PANEL": self.panel,
+            "PANEL": self.on_panel,
             "PLANAR": method == "plane-rasterizer-planar",
             "STAGGER": method == "plane-rasterizer-staggered",
         }
         program = self.job.program(name, defines=defines, version=VERSION)
         _set(program, picture=(part.width, part.rows), first_row=part.first_row, sample_at=self.sample_at)
         _set(program, pass_views=(views.first, views.count, self.size, self.views_in_all))
-        _set(program, planes=(self.job.first, part.planes), first_offset=float(self.job.draw.offsets[0]))
+        _set(program, plane_count=part.planes, first_offset=float(self.job.draw.offsets[0]))
         return program
 
-    def _encode(self, part: Round, tiles: range) -> None:
-        job, ctx = self.job, self.job.device.ctx
-        with _stage(job, "encode"):
-            job.atlas.target.use()
-            ctx.enable_only(ctx.DEPTH_TEST)
-            for number, (mesh, corners) in enumerate(zip(self.parts, self.corners, strict=True)):
-                defines = {**switches(job, mesh), "PANEL": self.panel}
-                program = job.program("tile.vert", "plane_encode.frag", defines=defines, version=VERSION)
+    def _encode(self, part: Round, first_tile: int, picture: Any) -> None:
+        """Shade what is seen, into a texture: the atlas, from a tile on, or a panel."""
+        job = self.job
+        across, down = -(-part.width // 4), -(-part.rows // 4)
+        groups = (-(-across // 4), down, 1) if self.on_panel else (-(-part.planes // 4), across, down)
+        for number, (mesh, corners) in enumerate(zip(self.parts, self.corners, strict=True)):
+            with _stage(job, "encode"):
+                defines = {**switches(job, mesh), "PANEL": self.on_panel}
+                program = job.program("plane_encode.comp", defines=defines, version=VERSION)
                 set_material(program, job, mesh)
                 corners.triangles.bind(1)
                 corners.points.bind(6)
                 corners.surfaces.bind(7)
-                _set(program, picture=(part.width, part.rows), first_row=part.first_row, first_view=tiles.start)
-                counts = {"first_tile": tiles.start, "first_channel": job.first, "plane_count": part.planes}
-                _set(program, **counts, sample_at=self.sample_at)
+                picture.bind_to_image(4)
+                _set(program, picture=(part.width, part.rows), first_row=part.first_row, sample_at=self.sample_at)
+                _set(program, first_tile=first_tile, plane_count=part.planes, flip=(job.draw.flip_x, job.draw.flip_y))
                 _set(program, range=(int(self.numbers[number]), mesh.triangles))
-                job.vertex_array(program, []).render(ctx.TRIANGLE_STRIP, vertices=4, instances=len(tiles))
+                program.run(*groups)
+
+    def _write_depths(self, part: Round, tiles: range) -> None:
+        """Into the atlas's depth buffer."""
+        job, ctx = self.job, self.job.device.ctx
+        program = job.program("tile.vert", "plane_depth.frag", version=VERSION)
+        _set(program, first_view=tiles.start, first_tile=tiles.start, plane_count=part.planes)
+        _set(program, picture=(part.width, part.rows), first_row=part.first_row)
+        job.atlas.target.color_mask = (False,) * 4
+        job.atlas.target.use()
+        ctx.enable_only(ctx.DEPTH_TEST)
+        job.vertex_array(program, []).render(ctx.TRIANGLE_STRIP, vertices=4, instances=len(tiles))
+        job.atlas.target.color_mask = (True,) * 4
 
 
 def check_size(job: Job) -> None:
     """Raise UnsupportedError when the column or row of a tile is more than an entry of the queue has bits for."""
-    layout = job.atlas.layout
-    if max(layout.width, layout.height) > MAX_SIDE:
+    camera = job.draw.camera
+    if max(camera.width, camera.height) > MAX_SIDE:
         raise UnsupportedError(
             f"method {job.draw.method!r}: pictures have at most {MAX_SIDE} pixels a side, "
-            f"this one {layout.width}×{layout.height}: choose a smaller size or single-pass"
+            f"this one {camera.width}×{camera.height}: choose a smaller size or single-pass"
         )
 
 

@@ -5,6 +5,7 @@
 #include "lib/shading.glsl"
 #ifdef TEXTURED
 #include "lib/texture.glsl"
+#include "lib/rasterised.glsl"
 #endif
 #include "lib/surface.glsl"
 

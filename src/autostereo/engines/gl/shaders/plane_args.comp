@@ -16,7 +16,7 @@ void spread(int at, uint count, uint layers) {
 }
 
 void main() {
-    uint groups = uint(pass_views.y + 3) / 4u, bands = uint(picture.y + 15) / 16u;
+    uint groups = uint(pass_views.y), bands = uint(picture.y + 15) / 16u;
     if (after_stage == 0) {
         small_triangles = large_triangles = entry_count = 0u;
     } else if (after_stage == 1) {

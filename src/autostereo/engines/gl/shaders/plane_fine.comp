@@ -1,10 +1,9 @@
-// Stage 3: the fine rasteriser, an invocation per tile of the queue. The first round leaves its coverage mask for the second.
+// Stage 3: the fine rasteriser, an invocation per tile of the queue.
 #define TRIANGLES
 #define ENTRIES
 #define DEPTHS
 #define WINNERS
 #ifdef PANEL
-#define SHOWN
 #define CAMERA_OFFSET
 #else
 #define BLOCKS
@@ -17,8 +16,7 @@
 
 layout(local_size_x = 64) in;
 
-uniform int room;    // of the entries
-uniform bool known;  // coverage masks: from the round before
+uniform int room;  // of the entries
 
 void main() {
     uint k = invocation();
@@ -27,10 +25,5 @@ void main() {
     }
     uvec4 entry = imageLoad(entries, place_of(k));
     ivec3 tile = ivec3(entry.y & 4095u, (entry.y >> 12) & 4095u, entry.y >> 24);
-    Triangle t = triangle_at(entry.x);
-    if (!known) {
-        entry.zw = coverage(t, tile);
-        imageStore(entries, place_of(k), entry);
-    }
-    put_tile(t, tile, entry.zw);
+    put_tile(triangle_at(entry.x), tile, entry.zw);
 }

@@ -10,7 +10,6 @@ layout(local_size_x = 64) in;
 
 uniform ivec2 picture;   // width; rows of this round
 uniform int first_row;
-uniform ivec2 planes;    // first channel and how many of them
 uniform ivec2 grouping;  // views per block, blocks
 
 void main() {
@@ -31,11 +30,11 @@ void main() {
         ivec2 at = mirrored(ivec2(pixel.x, pixel.y + first_row), ivec2(window.xy));
         ivec3 block = nearest_views(at.x, at.y) / grouping.x;
         vec3 offset = offsets_of_subpixels(at.x, at.y);
-        for (int c = planes.x; c < planes.x + planes.y; ++c) {
+        for (int c = 0; c < 3; ++c) {
             uvec2 bit = c < 2 ? uvec2(1u << (16 * c + i), 0u) : uvec2(0u, 1u << i);
             ivec2 place = place_of(uint(k * grouping.y + block[c]));
             imageStore(shown, place, imageLoad(shown, place) | uvec4(bit, 0u, 0u));
-            imageStore(camera_offset, place_of(sample_number(pixel, c - planes.x, picture.x, planes.y)), vec4(offset[c]));
+            imageStore(camera_offset, place_of(sample_number(pixel, c, picture.x, 3)), vec4(offset[c]));
         }
     }
 }

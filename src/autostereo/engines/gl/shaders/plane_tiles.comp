@@ -1,9 +1,9 @@
-// Stage 2: the tile rasteriser (PMR 2020, section 4.2). Finds the tiles of 4 x 4 pixels x 4 views that a triangle may touch.
+// Stage 2: the tile rasteriser (PMR 2020, section 4.2). Finds the tiles of 4 x 4 pixels x 4 views that a triangle covers.
 //
-// An invocation looks at one triangle and sixteen views, in groups of 4 x 4 x 4 tiles: a group's tiles are the bits of a
-// mask. First those within the triangle's box in each block of views, which slides with the parallax, then, if there are
-// many, those not wholly outside one of the three side faces. Tiles go to the queue; one that finds no room there is
-// rasterised at once, and `everything` repeats that for the second round.
+// An invocation looks at one triangle in one block of views: at those tiles within the triangle's box, which slides with the
+// parallax; if there are many, at those not wholly outside one of the three side faces. Tiles that are covered go to the
+// queue with their coverage masks; one that finds no room there is rasterised at once, and `everything` repeats that for
+// the second round.
 #define TRIANGLES
 #define ENTRIES
 #define DEPTHS
@@ -18,6 +18,7 @@
 #include "lib/plane_triangle.glsl"
 #include "lib/plane_pass.glsl"
 #include "lib/plane_tile.glsl"
+#include "lib/plane_coverage.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -27,16 +28,11 @@ uniform bool large;            // triangles of many tiles: sixteen rows an invoc
 uniform bool everything;       // rasterise all tiles here
 
 const float SLACK = 1.0 / 64.0;  // of a pixel, for rounding
+const int FEW = 4;               // rows or columns of tiles, which are not looked at as wholes
 const float ROUNDING = 4e-6;     // of E's terms
 
 int clamped(float x, int most) {
     return int(clamp(x, -1.0, float(most)));
-}
-
-// Four bits: those of first ... last in start ... start + 3.
-uint run(int first, int last, int start) {
-    int from = max(first - start, 0), to = min(last - start, 3);
-    return from > to ? 0u : ((2u << (to - from)) - 1u) << from;
 }
 
 // Whether some sample of a tile may be inside, from its greatest (front) or least (back) value of each side face.
@@ -60,6 +56,21 @@ bool may_cover(Edge e[3], bool both, ivec2 tile, vec2 reach) {
     return front || back;
 }
 
+// A tile to the queue, if it is covered; or, where it finds no room there, to the picture.
+void place(uint slot, Triangle t, Edge e[3], vec2 span, ivec3 tile) {
+    uvec2 mask = coverage(t, e, span, tile);
+    if (mask == uvec2(0u)) {
+        return;
+    }
+    uint at = everything ? uint(room) : atomicAdd(entry_count, 1u);
+    if (at < uint(room)) {
+        uint where = uint(tile.x) | uint(tile.y) << 12 | uint(tile.z) << 24;
+        imageStore(entries, place_of(at), uvec4(slot, where, mask));
+    } else {
+        put_tile(t, tile, mask);
+    }
+}
+
 void main() {
     uint k = invocation();
     if (k >= (large ? large_triangles : small_triangles)) {
@@ -67,73 +78,36 @@ void main() {
     }
     uint slot = large ? uint(triangle_room) - 1u - k : k;
     Triangle t = triangle_at(slot);
-    int layers = (pass_views.y + 3) / 4, layer = int(gl_WorkGroupID.z) % layers;
+    int block = int(gl_WorkGroupID.z) % pass_views.y;
     ivec2 rows = ivec2(t.info.zw) >> 2;
     if (large) {
-        int band = int(gl_WorkGroupID.z) / layers;
+        int band = int(gl_WorkGroupID.z) / pass_views.y;
         rows = ivec2(max(rows.x, 4 * band), min(rows.y, 4 * band + 3));
     }
     if (rows.x > rows.y) {
         return;
     }
 
-    // columns of tiles that the triangle's box slides over in each of four blocks of views
+    // columns of tiles that the triangle's box slides over in the block of views
     vec3 x = vec3(t.corner[0].x, t.corner[1].x, t.corner[2].x), p = vec3(t.corner[0].z, t.corner[1].z, t.corner[2].z);
-    float early = min(sample_at.x, min(sample_at.y, sample_at.z)) - SLACK;
-    float late = max(sample_at.x, max(sample_at.y, sample_at.z)) + SLACK;
-    ivec4 first = ivec4(1 << 20), last = ivec4(-1);
-    vec2 reach[4];
-    for (int b = 0; b < min(4, pass_views.y - 4 * layer); ++b) {
-        reach[b] = imageLoad(blocks, ivec2(1, pass_views.x + 4 * layer + b)).xy;
-        vec3 low = min(x + reach[b].x * p, x + reach[b].y * p), high = max(x + reach[b].x * p, x + reach[b].y * p);
-        int column = max(clamped(ceil(min(low.x, min(low.y, low.z)) - late), picture.x), 0);
-        int end = clamped(floor(max(high.x, max(high.y, high.z)) - early), picture.x - 1);
-        if (column <= end) {
-            first[b] = column >> 2;
-            last[b] = end >> 2;
-        }
+    vec2 reach = imageLoad(blocks, ivec2(1, pass_views.x + block)).xy;
+    vec3 left = x + reach.x * p, right = x + reach.y * p, low = min(left, right), high = max(left, right);
+    float early = min(sample_at.x, min(sample_at.y, sample_at.z));
+    float late = max(sample_at.x, max(sample_at.y, sample_at.z));
+    vec2 span = vec2(min(low.x, min(low.y, low.z)) - SLACK, max(high.x, max(high.y, high.z)) + SLACK);
+    int first = max(clamped(ceil(span.x - late), picture.x), 0), last = clamped(floor(span.y - early), picture.x - 1);
+    if (first > last) {
+        return;
     }
-    int leftmost = min(min(first.x, first.y), min(first.z, first.w)) >> 2;
-    int rightmost = max(max(last.x, last.y), max(last.z, last.w)) >> 2;
-    bvec4 broad = greaterThan(last - first, ivec4(0));
-    bool many = rows.y > rows.x && any(broad);
-    bool both = (t.info.y & BOTH_SIDES) != 0u;
-    Edge e[3];
-    if (many) {
-        e = Edge[3](edge_of(t, 0), edge_of(t, 1), edge_of(t, 2));
-    }
+    first >>= 2;
+    last >>= 2;
 
-    for (int gy = rows.x >> 2; gy <= rows.y >> 2; ++gy) {
-        uint down = run(rows.x, rows.y, 4 * gy);
-        down = (down & 1u) | (down & 2u) << 3 | (down & 4u) << 6 | (down & 8u) << 9;  // one bit in each row's four
-        for (int gx = leftmost; gx <= rightmost; ++gx) {
-            uvec2 mask = uvec2(run(first.x, last.x, 4 * gx) | run(first.y, last.y, 4 * gx) << 16,
-                               run(first.z, last.z, 4 * gx) | run(first.w, last.w, 4 * gx) << 16) * down;
-            ivec3 corner = ivec3(4 * gx, 4 * gy, 4 * layer);
-            if (many) {
-                uvec2 kept = uvec2(0u), left = mask;
-                while (left != uvec2(0u)) {
-                    uvec2 with = left;
-                    int bit = next_bit(left);
-                    if (may_cover(e, both, corner.xy + ivec2(bit & 3, (bit >> 2) & 3), reach[bit >> 4])) {
-                        kept |= with ^ left;
-                    }
-                }
-                mask = kept;
-            }
-            if (mask == uvec2(0u)) {
-                continue;
-            }
-            uint at = everything ? uint(room) : atomicAdd(entry_count, uint(bitCount(mask.x) + bitCount(mask.y)));
-            while (mask != uvec2(0u)) {
-                int bit = next_bit(mask);
-                ivec3 tile = corner + ivec3(bit & 3, (bit >> 2) & 3, bit >> 4);
-                if (at < uint(room)) {
-                    uint place = uint(tile.x) | uint(tile.y) << 12 | uint(tile.z) << 24;
-                    imageStore(entries, place_of(at++), uvec4(slot, place, 0u, 0u));
-                } else {
-                    put_tile(t, tile, coverage(t, tile));
-                }
+    bool many = last - first >= FEW && rows.y - rows.x >= FEW, both = (t.info.y & BOTH_SIDES) != 0u;
+    Edge e[3] = Edge[3](edge_of(t, 0), edge_of(t, 1), edge_of(t, 2));
+    for (int row = rows.x; row <= rows.y; ++row) {
+        for (int column = first; column <= last; ++column) {
+            if (!many || may_cover(e, both, ivec2(column, row), reach)) {
+                place(slot, t, e, span, ivec3(column, row, block));
             }
         }
     }

@@ -1,4 +1,4 @@
-// The fine rasteriser: a tile of 4 x 4 pixels and up to 4 views, voxel by voxel (PMR 2020, section 4.3).
+// The fine rasteriser: what a tile of 4 x 4 pixels and up to 4 views holds of a triangle, voxel by voxel (PMR 2020, 4.3).
 //
 // There are two rounds, as not every device has atomic operations of 64 bits: `find_depth` leaves the least depth in every
 // voxel, the next round the first triangle of that depth. Needs frame.glsl, plane_memory.glsl, plane_triangle.glsl,
@@ -77,29 +77,10 @@ struct SubPixel {
 SubPixel sub_pixel(ivec3 tile, int bit) {
     int c = bit >> 4;
     ivec2 pixel = 4 * tile.xy + ivec2(bit & 3, (bit >> 2) & 3);
-    uint number = sample_number(pixel, c - planes.x, picture.x, planes.y);
+    uint number = sample_number(pixel, c, picture.x, plane_count);
     float column = c == 0 ? sample_at.x : c == 1 ? sample_at.y : sample_at.z;
     vec2 place = vec2(pixel.x, pixel.y + first_row) + vec2(column, sample_at.w);
     return SubPixel(number, place, imageLoad(camera_offset, place_of(number)).x);
-}
-
-// Coverage mask of a tile: those sub-pixels that show a camera of the block and see the triangle.
-uvec2 coverage(Triangle t, ivec3 tile) {
-    int tiles_across = (picture.x + 3) >> 2, all_blocks = (pass_views.w + pass_views.z - 1) / pass_views.z;
-    int entry = (tile.y * tiles_across + tile.x) * all_blocks + pass_views.x + tile.z;
-    uvec2 left = imageLoad(shown, place_of(uint(entry))).xy, mask = uvec2(0u);
-    Edge e[3] = Edge[3](edge_of(t, 0), edge_of(t, 1), edge_of(t, 2));
-    bool both = (t.info.y & BOTH_SIDES) != 0u;
-    while (left != uvec2(0u)) {
-        uvec2 with = left;
-        SubPixel s = sub_pixel(tile, next_bit(left));
-        bvec3 is_before;
-        for (int k = 0; k < 3; ++k) {
-            is_before[k] = before(e[k], edge_in_view(e[k], s.offset), s.place.x, s.place.y);
-        }
-        mask |= all(is_before) || (both && !any(is_before)) ? with ^ left : uvec2(0u);
-    }
-    return mask;
 }
 
 void put_tile(Triangle t, ivec3 tile, uvec2 mask) {
@@ -112,36 +93,10 @@ void put_tile(Triangle t, ivec3 tile, uvec2 mask) {
     }
 }
 #else
-// Coverage mask of a tile: bit v*16 + y*4 + x.
-uvec2 coverage(Triangle t, ivec3 tile) {
-    Edge e0 = edge_of(t, 0), e1 = edge_of(t, 1), e2 = edge_of(t, 2);
-    uint both = (t.info.y & BOTH_SIDES) != 0u ? 15u : 0u;
-    int block = pass_views.x + tile.z;
-    int views = min(pass_views.z, pass_views.w - block * pass_views.z);
-    vec4 offset = imageLoad(blocks, ivec2(0, block));
-    vec4 x = float(4 * tile.x) + sample_at.x + vec4(0.0, 1.0, 2.0, 3.0);
-    uint columns = (1u << min(4, picture.x - 4 * tile.x)) - 1u;
-    int top = max(4 * tile.y, int(t.info.z)), bottom = min(4 * tile.y + 3, int(t.info.w));
-    uvec2 mask = uvec2(0u);
-    for (int k = 0; k < views; ++k) {
-        vec2 in0 = edge_in_view(e0, offset.x), in1 = edge_in_view(e1, offset.x), in2 = edge_in_view(e2, offset.x);
-        offset = offset.yzwx;
-        uint found = 0u;
-        for (int row = top; row <= bottom; ++row) {
-            float y = float(row + first_row) + sample_at.w;
-            uint a = columns_before(e0, in0, x, y), b = columns_before(e1, in1, x, y), c = columns_before(e2, in2, x, y);
-            found |= (((a & b & c) | (both & ~(a | b | c))) & columns) << 4 * (row & 3);
-        }
-        found <<= 16 * (k & 1);
-        mask |= k < 2 ? uvec2(found, 0u) : uvec2(0u, found);
-    }
-    return mask;
-}
-
 void put_tile(Triangle t, ivec3 tile, uvec2 mask) {
     vec4 offset = imageLoad(blocks, ivec2(0, pass_views.x + tile.z));
     vec2 corner = vec2(4 * tile.x, 4 * tile.y + first_row) + sample_at.xw;
-    uint start = sample_number(4 * tile.xy, tile.z * pass_views.z, picture.x, planes.y);
+    uint start = sample_number(4 * tile.xy, tile.z * pass_views.z, picture.x, plane_count);
 #ifdef STAGGER
     uint turned = t.info.x & 3u;  // begin with this view: 16 bits each
     mask = (turned & 2u) != 0u ? mask.yx : mask;

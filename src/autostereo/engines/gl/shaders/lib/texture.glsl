@@ -13,11 +13,3 @@ vec3 trilinear(vec2 uv, vec2 dx, vec2 dy) {
     float fine = floor(level);
     return mix(textureLod(image, uv, fine).rgb, textureLod(image, uv, min(fine + 1.0, top)).rgb, level - fine);
 }
-
-// Colour at a rasterised sample. Texture coordinates over depth, and 1/depth, are affine in the picture: their differences
-// within a quad of pixels are their derivatives whatever the quad, and the quotient rule gives those of the coordinates.
-vec3 rasterised(vec2 uv, float inverse_depth) {
-    vec2 s = uv * inverse_depth;
-    return trilinear(uv, (dFdx(s) - uv * dFdx(inverse_depth)) / inverse_depth,
-                     (dFdy(s) - uv * dFdy(inverse_depth)) / inverse_depth);
-}
