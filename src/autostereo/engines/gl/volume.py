@@ -4,13 +4,14 @@ The methods of Hübner 2007a: `n-pass` and its kin follow a ray per pixel of eve
 `covering-quad` follow the rays of a panel's sub-pixels, each from its own eye, over what was gathered before. Rays
 march in the fragment shader (volume.frag), or slices are blended (`Options.proxy`, volume_slices.py).
 
-What the three rays of a pixel share: the search for what is empty, and the end of the march; with `volume="shared"`,
-where they pass within 2·NEAR voxels of each other, lookups and their light, too. A ray's scalar is then that of a
-lookup at most NEAR voxels beside it, carried on along the gradient g that is looked up with it (Taylor's first
-order): it is off by no more than NEAR·max|∂s/∂x − g|, not at all where scalars are linear. Without light there is no
-gradient; rays share within 2·NEAR_UNLIT voxels, and are off by NEAR_UNLIT·|∂s/∂x|. Each ray has its own
-classification. Displays that show one view in all of a pixel need one ray a pixel. With `volume="exact"` only equal
-rays share, and slabs are lit in their middle, not by the mean of the light at their ends.
+With `volume="exact"`, and on GPUs, each ray of a panel is a fragment's own, a channel after the other: panels are those
+of n passes, to the bit. Elsewhere the three rays of a pixel are followed together. What they share then: the search for
+what is empty, and the end of the march; where they pass within 2·NEAR voxels of each other, lookups and their light,
+too. A ray's scalar is then that of a lookup at most NEAR voxels beside it, carried on along the gradient g that is
+looked up with it (Taylor's first order): it is off by no more than NEAR·max|∂s/∂x − g|, not at all where scalars are
+linear. Without light there is no gradient; rays share within 2·NEAR_UNLIT voxels, and are off by NEAR_UNLIT·|∂s/∂x|.
+Each ray has its own classification. Displays that show one view in all of a pixel need one ray a pixel.
+`volume="exact"` also lights slabs in their middle, not by the mean of the light at their ends.
 
 Order of a scene: isosurfaces are opaque and come before points; then volumes that compose, together; then those of the
 greatest value one by one (engines/reference/picture.py).
@@ -50,6 +51,7 @@ SHADERS = {
     "iso": ("volume.vert", "volume_iso.frag"),
     "slices": ("volume_slice.vert", "volume_slice.frag"),
 }
+EVERYTHING = (True,) * 4
 VOXELS, EMPTY, TABLES, COLOR_BEFORE, DEPTH_BEFORE = 0, 4, 8, 12, 13  # texture units
 
 
@@ -110,8 +112,13 @@ class Rays(Stage):
             if by_slices(job, group):
                 assert slices is not None
                 slices_on_panel(job, program, slices.slabs, panel)
-            else:
+                continue
+            many = len(target.color_attachments)
+            for channel, mask in enumerate(masks(job, group)):
+                put_units(program, channel=channel)
+                target.color_mask = (mask,) * many if many > 1 else mask
                 render(job, program, (target, job.device.ctx.NOTHING, False))
+            target.color_mask = (EVERYTHING,) * many if many > 1 else EVERYTHING
 
     def _slices(self, job: Job) -> Slices | None:
         return make_slices(self._all, job.draw.camera, job.draw.options.step)
@@ -126,7 +133,7 @@ class Rays(Stage):
             **self._switches(job, group),
             "COARSE": self._coarse,
             "PANEL": on_panel,
-            "LANES": lanes(job),
+            "LANES": lanes(job, group),
             "OPAQUE": beneath is not None and has_opaque(job),
             "COVERED": beneath is not None,
             "AVERAGED": on_panel and job.draw.options.alpha == "averaged",
@@ -195,8 +202,9 @@ class Rays(Stage):
         """Tables of pre-integrated slabs: made again for another transfer function or quite another length."""
         step = round(LENGTHS * np.log2(slices.distance))
         for k, volume in enumerate(group):
-            make = partial(make_table, job.device, volume, 2.0 ** (step / LENGTHS), lanes(job) == 3)
-            table = job.kept.get(("slab table", k, lanes(job)), (volume.transfer, step), make)
+            each = lanes(job, group)
+            make = partial(make_table, job.device, volume, 2.0 ** (step / LENGTHS), each == 3)
+            table = job.kept.get(("slab table", k, each), (volume.transfer, step), make)
             table.use(TABLES + k)
         put_units(program, slab_table=[TABLES + k for k in range(len(group))])
         put(program, table_place=[place_in(table_range(v), v.value_range, TABLE) for v in group])
@@ -224,12 +232,32 @@ def by_slices(job: Job, group: list[Volume]) -> bool:
     return options.proxy == "slices" and group[0].mode == "composite" and not options.depth
 
 
-def lanes(job: Job) -> int:
+def lanes(job: Job, group: list[Volume]) -> int:
     """How many rays a fragment follows: one, or those of a pixel's three sub-pixels."""
-    if job.columns is None:
-        return 1
-    assert job.mask is not None
-    return 1 if one_view(job.mask.viewmap) and len(set(job.columns)) == 1 else 3
+    return 1 if job.columns is None or same_rays(job) or apart(job, group) else 3
+
+
+def same_rays(job: Job) -> bool:
+    """Whether the sub-pixels of a panel's pixel see along the same ray."""
+    assert job.mask is not None and job.columns is not None
+    return one_view(job.mask.viewmap) and len(set(job.columns)) == 1
+
+
+def apart(job: Job, group: list[Volume]) -> bool:
+    """Whether a panel's channels are drawn one after the other, so that fragments follow a ray each.
+
+    Where nothing is approximated; and on GPUs, which three rays at a time cost more registers than sharing saves.
+    """
+    options = job.draw.options
+    alone = job.device.is_hardware or options.volume == "exact"
+    return alone and not by_slices(job, group) and options.alpha != "averaged"
+
+
+def masks(job: Job, group: list[Volume]) -> tuple[tuple[bool, ...], ...]:
+    """What of a panel's colours each draw of a group writes."""
+    if lanes(job, group) == 3 or same_rays(job):
+        return (EVERYTHING,)
+    return tuple((*(c == channel for c in range(3)), True) for channel in range(3))
 
 
 def one_view(viewmap: ViewMap) -> bool:

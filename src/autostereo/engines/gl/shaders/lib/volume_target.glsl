@@ -6,6 +6,7 @@
 #ifdef PANEL
 uniform vec3 columns;          // where in a pixel the channels are sampled
 uniform float sample_row;
+uniform int channel;           // whose ray is followed, if it is one
 #else
 flat in vec3 view;             // camera offset; first column and row of the tile
 #endif
@@ -65,8 +66,8 @@ void start_rays() {
     turn_x = by_lane(x);
     twins = origin_x.x == origin_x.z && turn_x.x == turn_x.z;
 #else
-    vec3 ray = ray_direction(place + vec2(columns[0], 0.0), eyes[0]);
-    origin_x = eyes[0];
+    vec3 ray = ray_direction(place + vec2(columns[channel], 0.0), eyes[channel]);
+    origin_x = eyes[channel];
 #endif
 #else
     vec3 ray = ray_direction(gl_FragCoord.xy - view.yz, view.x);
@@ -85,6 +86,9 @@ void start_rays() {
     vec3 depth = 1.0 / (depth_range.x - z.rgb * depth_range.y);
     stop = mix(vec3(1e30), depth, lessThan(z.rgb, vec3(1.0)));
 #else
+#ifdef PANEL
+    z.r = z[channel];
+#endif
     stop = z.r < 1.0 ? depth_from_window(z.r) : 1e30;
 #endif
 #endif
