@@ -152,7 +152,7 @@ def test_slices_of_views_are_the_march():
 @pytest.mark.parametrize("scene", ["lights", "mip", "iso", "two", "with a mesh", "all modes, a mesh"])
 def test_one_pass_is_n_passes(scene, display):
     one, many = (panel(scene, display, method, volume="exact") for method in ("single-pass", "n-pass"))
-    ties = 1 if scene == "all modes, a mesh" else 0  # where the two meet: depths have 24 bits in an atlas, 32 in a panel
+    ties = 1 if scene == "all modes, a mesh" else 0  # depths have 24 bits in an atlas, 32 in a panel
     assert (one != many).sum() <= ties
 
 

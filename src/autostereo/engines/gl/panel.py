@@ -85,6 +85,13 @@ class Panel:
         read_into(self.target, out)
 
 
+def write_only(target: Any, mask: tuple[bool, ...] = (True,) * 4) -> None:
+    """Draw to a framebuffer, and write all its colours in these channels alone."""
+    count = len(target.color_attachments)
+    target.color_mask = mask if count == 1 else (mask,) * count
+    target.use()  # masks of a single colour are not taken over before
+
+
 class Mean:
     """The mean of several samples of a picture."""
 

@@ -27,7 +27,7 @@ from ...scene.points import Points
 from .atlas import Layout
 from .context import ADD, Device
 from .job import Job, Stage
-from .panel import Panel
+from .panel import Panel, write_only
 from .points_buffers import CONSTANTS, SurfelBuffers, give_draw
 from .points_groups import number_of_groups, sum_groups
 from .programs import Defines
@@ -204,14 +204,13 @@ class PointClouds(Stage):
         program = job.masked_program("screen.vert", "points_resolve.frag", defines=defines)
         part.sheet.give(program)
         program["sheet"] = part.place
-        panel.both.use()
         ctx.enable_only(ctx.NOTHING)
         for channel in range(3):
             mask = tuple(k == channel for k in range(4))
-            panel.both.color_mask = (mask, mask)
+            write_only(panel.both, mask)
             program["channel"] = channel
             job.cover(program)
-        panel.both.color_mask = ((True,) * 4,) * 2
+        write_only(panel.both)
 
 
 def has_others(job: Job) -> bool:

@@ -36,7 +36,7 @@ from ..volumes import Slices, make_slices
 from .beneath import Beneath
 from .context import Device
 from .job import Job, Stage
-from .panel import Panel
+from .panel import Panel, write_only
 from .programs import Defines
 from .volume_data import TABLE, Look, is_shaded, make_table, place_in, send, table_range
 from .volume_slices import slices_on_panel, slices_on_tiles
@@ -51,7 +51,6 @@ SHADERS = {
     "iso": ("volume.vert", "volume_iso.frag"),
     "slices": ("volume_slice.vert", "volume_slice.frag"),
 }
-EVERYTHING = (True,) * 4
 VOXELS, EMPTY, TABLES, COLOR_BEFORE, DEPTH_BEFORE = 0, 4, 8, 12, 13  # texture units
 
 
@@ -113,12 +112,11 @@ class Rays(Stage):
                 assert slices is not None
                 slices_on_panel(job, program, slices.slabs, panel)
                 continue
-            many = len(target.color_attachments)
             for channel, mask in enumerate(masks(job, group)):
                 put_units(program, channel=channel)
-                target.color_mask = (mask,) * many if many > 1 else mask
+                write_only(target, mask)
                 render(job, program, (target, job.device.ctx.NOTHING, False))
-            target.color_mask = (EVERYTHING,) * many if many > 1 else EVERYTHING
+            write_only(target)
 
     def _slices(self, job: Job) -> Slices | None:
         return make_slices(self._all, job.draw.camera, job.draw.options.step)
@@ -256,7 +254,7 @@ def apart(job: Job, group: list[Volume]) -> bool:
 def masks(job: Job, group: list[Volume]) -> tuple[tuple[bool, ...], ...]:
     """What of a panel's colours each draw of a group writes."""
     if lanes(job, group) == 3 or same_rays(job):
-        return (EVERYTHING,)
+        return ((True,) * 4,)
     return tuple((*(c == channel for c in range(3)), True) for channel in range(3))
 
 
