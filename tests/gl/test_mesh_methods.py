@@ -32,10 +32,11 @@ def device():
 
 
 def render(scene, display, method, rig=RIG, **options):
-    """A panel; "single-pass in views" draws views also where rays are expected to be faster."""
+    """A panel; "single-pass in views" draws views also where something else is expected to be faster."""
     if method == "single-pass in views":
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(frames, "CLEARLY", 0.0)
+            for module in (frames, plane_rasterizer):
+                patch.setattr(module, "CLEARLY", 0.0)
             return render(scene, display, "single-pass", rig, **options)
     rig = rig.with_views(display.views)
     return aus.render(scene, display, rig, method=method, engine="gl", options=aus.Options(**options)).pixels
@@ -171,22 +172,35 @@ def test_snapped_corners_stay_within_what_is_allowed():
 
 
 def test_a_single_pass_takes_the_cheaper_way():
-    """Few triangles for many views: rays; many triangles for few views: views. Continuous panels always rays."""
-    from autostereo.engines.engine import get_engine
+    """Few triangles for many views: rays; many triangles for few views: views, for many the plane rasteriser.
 
+    Continuous panels never by views.
+    """
     few = aus.Scene(aus.Mesh([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], [[0, 1, 2]]))
     many = aus.Scene(aus.Mesh(*sphere(5)))
     slanted = {"lens_pitch": 5.7, "subpixel_pitch": 1.0, "slant_deg": 9.5}
-    size = 160, 120
-    for scene, display, rays in [
-        (few, aus.Display.slanted(*size, 45, **slanted), True),
-        (many, aus.Display.wavelength_selective(*size), False),
-        (many, aus.Display.slanted(*size, 8, **slanted, continuous=True), True),
+    size = 512, 384
+    ways = {"views": "atlas", "rays": "channels", "planes": "plane queue"}
+    for scene, display, way in [
+        (few, aus.Display.slanted(*size, 45, **slanted), "rays"),
+        (few, aus.Display.slanted(*size, 45, **slanted, continuous=True), "rays"),
+        (many, aus.Display.wavelength_selective(*size), "views"),
+        (many, aus.Display.slanted(*size, 45, **slanted), "planes"),
+        (many, aus.Display.slanted(*size, 8, **slanted, continuous=True), "planes"),
     ]:
-        renderer = aus.Renderer(scene, get_engine("gl").name)
+        renderer = aus.Renderer(scene, "gl")
         renderer.render(display, RIG.with_views(display.views))
-        assert ("channels" in renderer._prepared.kept) is rays
-        assert ("atlas" in renderer._prepared.kept) is not rays
+        kept = {name for name, key in ways.items() if key in renderer._prepared.kept}
+        assert kept == {way}
+
+
+def test_a_stack_of_many_views_of_many_triangles_is_rasterised_in_one_pass():
+    scene = aus.Scene(aus.Mesh(*sphere(5)))
+    for count, size, way in ((2, (256, 192), "n-pass"), (64, (64, 48), "plane-rasterizer")):
+        rig = RIG.with_views(count)
+        found, expected = (views(scene, rig, method, size) for method in ("single-pass", way))
+        np.testing.assert_array_equal(found.color, expected.color)
+        np.testing.assert_array_equal(found.depth, expected.depth)
 
 
 # --- every sub-pixel for its own camera ----------------------------------------------------------------

@@ -17,11 +17,9 @@ from ..engine import Target
 from ..gathering import Tiles
 from .atlas import Atlas, Layout
 from .blocks import stored_background
-from .job import Job, Stage
+from .job import CLEARLY, VIEW_PIXEL, Job, Stage
 from .panel import ALL, Mean, Panel
 
-VIEW_PIXEL = 15e-9  # seconds of a CPU that drawing for it takes per pixel of an atlas, in any scene, measured
-CLEARLY = 0.7  # of the expected time: estimates err
 CHANNELS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 

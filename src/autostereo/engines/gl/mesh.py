@@ -39,19 +39,24 @@ class Meshes(Stage):
 
     def __init__(self, device: Device, meshes: Sequence[Mesh], middle: NDArray[np.float64]) -> None:
         self._parts = upload_meshes(device, meshes, middle)
-        self._triangles, self._few = some_triangles(meshes)
+        self.triangles, self._few = some_triangles(meshes)
 
     def costs(self, job: Job) -> tuple[float, float]:
         """From the sizes of some triangles' covering quads."""
+        width, height, slide = self.sizes(job)
+        camera = job.draw.camera
+        area = float(np.mean(np.minimum(width + 1 + slide, camera.width) * np.minimum(height + 1, camera.height)))
+        views = VIEW_TRIANGLE * len(job.draw.offsets) * self.triangles
+        return views, self.triangles * (QUAD_TRIANGLE + 3 * QUAD_FRAGMENT * area)
+
+    def sizes(self, job: Job) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Width and height in pixels of some triangles' boxes, and how far they slide over all views."""
         camera, (left, right) = job.draw.camera, job.draw.culling
         points = apply(camera.eye_from_world, self._few.reshape(-1, 3)).reshape(-1, 3, 3)
         depth = np.maximum(points[..., 2], camera.near)
         slide = camera.fx * (right - left) * np.abs(1 / camera.focal - 1 / depth).max(axis=1)
-        sides = np.ptp(points[..., :2] / depth[..., None], axis=1) * (camera.fx, camera.fy) + [1, 1]
-        width = np.minimum(sides[:, 0] + slide, camera.width)
-        area = float(np.mean(width * np.minimum(sides[:, 1], camera.height)))
-        views = VIEW_TRIANGLE * len(job.draw.offsets) * self._triangles
-        return views, self._triangles * (QUAD_TRIANGLE + 3 * QUAD_FRAGMENT * area)
+        sides = np.ptp(points[..., :2] / depth[..., None], axis=1) * (camera.fx, camera.fy)
+        return sides[:, 0], sides[:, 1], slide
 
     def draw_views(self, job: Job, tiles: range) -> None:
         """Draw the views of these tiles, each part in one call."""

@@ -28,7 +28,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import UnsupportedError
-from .job import Job
+from ...scene.mesh import Mesh
+from .job import CLEARLY, VIEW_PIXEL, Job
 from .mesh import Meshes, set_material, switches
 from .panel import Panel
 from .plane_buffers import (
@@ -50,13 +51,16 @@ from .plane_buffers import (
 )
 from .programs import Defines
 
-METHODS = ("plane-rasterizer", "plane-rasterizer-n-pass", "plane-rasterizer-planar", "plane-rasterizer-staggered")
+ONE_VIEW = "plane-rasterizer-n-pass"
+METHODS = ("plane-rasterizer", ONE_VIEW, "plane-rasterizer-planar", "plane-rasterizer-staggered")
 VERSION = 430  # compute shaders and storage buffers
 # SHADER_STORAGE, SHADER_IMAGE_ACCESS, COMMAND, BUFFER_UPDATE, TEXTURE_UPDATE; TEXTURE_FETCH, FRAMEBUFFER for pictures
 BARRIERS = 0x2000 | 0x20 | 0x40 | 0x200 | 0x100 | 0x8 | 0x400
 GROUP = 64  # invocations of a work group
 CHANNELS = 3
 GROUPS = 65535  # work groups in one direction, as many as every device has
+# seconds of a CPU, measured on llvmpipe: a triangle, a tile that is looked at for it, a sample of the picture
+PLANE_TRIANGLE, PLANE_TILE, PLANE_SAMPLE = 0.1e-6, 50e-9, 85e-9
 STAGES = ("clear", "vertices", "setup", "tiles", "depth", "winner", "encode")
 
 _clock: dict[str, float] | None = None
@@ -101,14 +105,39 @@ class PlaneMeshes(Meshes):
 
     def draws_over(self, job: Job) -> bool:
         """On panels by the methods here, which draw nothing but meshes: their sub-pixels need no tiles."""
-        return job.draw.method in METHODS
+        return job.draw.method in METHODS or self._is_fastest(job)
 
     def draw_views(self, job: Job, tiles: range) -> None:
         """Draw the views of these tiles."""
-        if job.draw.method in METHODS:
+        if job.draw.method in METHODS or (job.mask is None and self._is_fastest(job)):
             Drawing(job, self._parts).views()
         else:
             super().draw_views(job, tiles)
+
+    def _is_fastest(self, job: Job) -> bool:
+        """Whether a single pass is expected to be clearly faster this way: many triangles in many views."""
+        draw, camera = job.draw, job.draw.camera
+        able = job.device.version >= VERSION and max(camera.width, camera.height) <= MAX_SIDE
+        if draw.method != "single-pass" or not able or any(type(item) is not Mesh for item in job.scene.objects):
+            return False
+        views, channels = self.costs(job)
+        views += VIEW_PIXEL * len(draw.offsets) * camera.width * camera.height
+        if draw.viewmap is None:
+            others = views
+        else:
+            others = channels if draw.viewmap.continuous else min(views, channels)
+        return self._cost(job) < CLEARLY * others
+
+    def _cost(self, job: Job) -> float:
+        """Expected seconds of a CPU, from the sizes of some triangles' boxes in each block of views."""
+        camera, views = job.draw.camera, len(job.draw.offsets)
+        on_panel = job.draw.viewmap is not None
+        blocks = -(-views // views_of_a_block(job))
+        width, height, slide = self.sizes(job)
+        across = np.minimum(width + slide / blocks, camera.width) / 4 + 1
+        tiles = float(np.mean(across * (np.minimum(height, camera.height) / 4 + 1) * np.minimum(height, 1)))
+        samples = (3 if on_panel else views) * camera.width * camera.height
+        return self.triangles * (PLANE_TRIANGLE + PLANE_TILE * blocks * tiles) + PLANE_SAMPLE * samples
 
     def draw_panel(self, job: Job, panel: Panel) -> None:
         """Draw the sub-pixels of a panel."""
@@ -131,17 +160,12 @@ class Drawing:
         self.room = room = 2 * min(count, MAX_TRIANGLES)
         self.triangles = kept.get("plane triangles", room, lambda: Memory(device, TRIANGLE_TEXELS * room, 4, "u4"))
         self.corners = kept.get("plane corners", None, self._send_corners)
-        self.one_view = job.draw.method == "plane-rasterizer-n-pass"
+        self.one_view = job.draw.method == ONE_VIEW
         self.on_panel = job.columns is not None
-        self.size = self._views_of_a_block()
+        self.size = views_of_a_block(job)
         self.blocks, self.block_texture = upload_blocks(job, self.size)
         self.sample_at = (*(job.columns or (0.5, 0.5, 0.5)), job.row)
         self.views_in_all = len(job.draw.offsets) if self.on_panel else job.count
-
-    def _views_of_a_block(self) -> int:
-        if self.one_view:
-            return 1
-        return max(BLOCK_VIEWS, len(self.job.draw.offsets) // PANEL_BLOCKS) if self.on_panel else BLOCK_VIEWS
 
     def _send_corners(self) -> list[Corners]:
         result = []
@@ -314,6 +338,13 @@ class Drawing:
         ctx.enable_only(ctx.DEPTH_TEST)
         job.vertex_array(program, []).render(ctx.TRIANGLE_STRIP, vertices=4, instances=len(tiles))
         job.atlas.target.color_mask = (True,) * 4
+
+
+def views_of_a_block(job: Job) -> int:
+    """How many views are looked at together: of a panel as many as its tiles' sub-pixels are worth the looking."""
+    if job.draw.method == ONE_VIEW:
+        return 1
+    return BLOCK_VIEWS if job.draw.viewmap is None else max(BLOCK_VIEWS, len(job.draw.offsets) // PANEL_BLOCKS)
 
 
 def check_size(job: Job) -> None:
