@@ -10,7 +10,7 @@ import pytest
 import autostereo as aus
 from agreement.helpers import RIG, SCENES, SIZE, assert_agree, interior_of_panel, interior_of_views, levels_of, sphere
 from agreement.test_mesh_agreement import DISPLAYS
-from autostereo.engines.gl import atlas, frames
+from autostereo.engines.gl import atlas, frames, plane_rasterizer
 from autostereo.engines.gl.mesh_buffers import split_by_repeat
 from gl_device import need_device
 
