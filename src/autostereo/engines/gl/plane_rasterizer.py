@@ -120,13 +120,18 @@ class PlaneMeshes(Meshes):
         able = job.device.version >= VERSION and max(camera.width, camera.height) <= MAX_SIDE
         if draw.method != "single-pass" or not able or any(type(item) is not Mesh for item in job.scene.objects):
             return False
+        place = camera.eye_from_world.tobytes(), draw.offsets.tobytes(), draw.culling, draw.viewmap
+        lens = camera.fx, camera.fy, camera.width, camera.height, camera.focal, camera.near
+        return bool(job.kept.get("plane is fastest", (place, lens), lambda: self._cost(job) < self._least_other(job)))
+
+    def _least_other(self, job: Job) -> float:
+        """Seconds that any other way is expected to take, less a margin."""
+        draw, camera = job.draw, job.draw.camera
         views, channels = self.costs(job)
         views += VIEW_PIXEL * len(draw.offsets) * camera.width * camera.height
         if draw.viewmap is None:
-            others = views
-        else:
-            others = channels if draw.viewmap.continuous else min(views, channels)
-        return self._cost(job) < CLEARLY * others
+            return CLEARLY * views
+        return CLEARLY * (channels if draw.viewmap.continuous else min(views, channels))
 
     def _cost(self, job: Job) -> float:
         """Expected seconds of a CPU, from the sizes of some triangles' boxes in each block of views."""
