@@ -16,7 +16,7 @@ from .job import Job
 from .mesh_buffers import Part
 
 BLOCK_VIEWS = 4  # views of a tile (PMR 2020, section 4: 4×4×4 voxels)
-PANEL_BLOCKS = 8  # of a panel, whose tiles hold sub-pixels; but BLOCK_VIEWS at least in each
+PANEL_BLOCKS = 8  # at least, of a panel of so many views: what its tiles hold is sub-pixels, however many show a block
 MAX_BLOCKS = 256  # of a pass: 8 bits of an entry
 MAX_SIDE = 4 * 2**12  # pixels of a picture: 12 bits of an entry for its tiles
 MAX_TRIANGLES = 2**21  # set up at a time; near clipping may double them

@@ -349,7 +349,7 @@ def views_of_a_block(job: Job) -> int:
     """How many views are looked at together: of a panel as many as its tiles' sub-pixels are worth the looking."""
     if job.draw.method == ONE_VIEW:
         return 1
-    return BLOCK_VIEWS if job.draw.viewmap is None else max(BLOCK_VIEWS, len(job.draw.offsets) // PANEL_BLOCKS)
+    return BLOCK_VIEWS if job.draw.viewmap is None else max(1, len(job.draw.offsets) // PANEL_BLOCKS)
 
 
 def check_size(job: Job) -> None:
