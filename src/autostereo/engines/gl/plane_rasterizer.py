@@ -316,8 +316,7 @@ class Drawing:
     def _encode(self, part: Round, first_tile: int, picture: Any) -> None:
         """Shade what is seen, into a texture: the atlas, from a tile on, or a panel."""
         job = self.job
-        across, down = -(-part.width // 4), -(-part.rows // 4)
-        groups = (-(-across // 4), down, 1) if self.on_panel else (-(-part.planes // 4), across, down)
+        groups = -(-part.width // 16), -(-part.rows // 4), 1 if self.on_panel else part.planes
         for number, (mesh, corners) in enumerate(zip(self.parts, self.corners, strict=True)):
             with _stage(job, "encode"):
                 defines = {**switches(job, mesh), "PANEL": self.on_panel}

@@ -34,9 +34,7 @@ uniform vec4 sample_at;      // x of three channels, y
 uniform ivec2 range;         // numbers of the part's triangles: first, how many
 uniform bvec2 flip;          // the panel shows the picture mirrored
 
-const uint NOTHING = 0xffffffffu;
-
-// The part's triangle that a sample sees; NOTHING, or another number beyond the part's, if it sees none.
+// The part's triangle that a sample sees; a number beyond the part's if it sees none.
 uint triangle_seen(uint k) {
     return imageLoad(winners, place_of(k)).x - uint(range.x);
 }
@@ -73,13 +71,9 @@ vec3 shade(uint number, vec2 position, float v) {
 }
 
 void main() {
-    // a group is four tiles of 4 x 4 pixels: side by side on a panel, else of four views
-    uint i = gl_LocalInvocationID.x & 15u, quarter = 4u * gl_WorkGroupID.x + (gl_LocalInvocationID.x >> 4);
-#ifdef PANEL
-    uvec2 tile = uvec2(quarter, gl_WorkGroupID.y);
-#else
-    uvec2 tile = gl_WorkGroupID.yz;
-#endif
+    // a group is four tiles of 4 x 4 pixels side by side; its z is the plane
+    uint i = gl_LocalInvocationID.x & 15u;
+    uvec2 tile = uvec2(4u * gl_WorkGroupID.x + (gl_LocalInvocationID.x >> 4), gl_WorkGroupID.y);
     ivec2 pixel = ivec2(4u * tile + uvec2(i & 3u, i >> 2));
     if (pixel.x >= picture.x || pixel.y >= picture.y) {
         return;
@@ -103,8 +97,8 @@ void main() {
         imageStore(painted, at, vec4(mix(rest, color, found), 1.0));
     }
 #else
-    int plane = int(quarter);
-    uint number = plane < plane_count ? triangle_seen(sample_number(pixel, plane, picture.x, plane_count)) : NOTHING;
+    int plane = int(gl_WorkGroupID.z);
+    uint number = triangle_seen(sample_number(pixel, plane, picture.x, plane_count));
     if (number < uint(range.y)) {
         vec4 view = views[first_tile + plane];
         vec3 color = shade(number, vec2(at) + sample_at.xw, view.x);
