@@ -130,8 +130,35 @@ def row_camera(r, width, table, a, b, offsets, cell_mode, height, views, continu
 
 
 @kernel
-def row_views(r, width, m, u, out):
+def steps_along(width, m):
+    """Return a·x and the offset of every sub-pixel of a row, (3W,) float64: the same in all rows; for `row_views`."""
+    along, offset = np.empty(3 * width), np.empty(3 * width)
+    for x in range(width):
+        for c in range(3):
+            along[3 * x + c] = m.a * x
+            offset[3 * x + c] = m.offsets[0, c]
+    return along, offset
+
+
+@kernel
+def _phase_views(br, along, offset, views, least, reverse, out):
+    """`row_views` of a plain phase map in one loop, in the order of operations of `row_camera`; vectorised."""
+    most = views - 1.0
+    for i in range(out.shape[0]):
+        t = along[i] + br + offset[i]
+        phi = t - np.floor(t)
+        if reverse:
+            phi = 1.0 - phi
+        phi = phi if phi < 1.0 else 0.0
+        out[i] = np.int32(min(phi * views - least + least, most))
+
+
+@kernel
+def row_views(r, width, m, steps, u, out):
     """Fill out (3W,) int32 with the nearest view of each sub-pixel of row r; u (W, 3) is scratch."""
+    if m.table.shape[0] == 0 and (m.offsets.shape[0] == 1 or m.cell_mode == 0):
+        _phase_views(m.b * r, steps[0], steps[1], m.views, 0.5 if m.continuous else 0.0, m.reverse, out)
+        return
     row_camera(
         r, width, m.table, m.a, m.b, m.offsets, m.cell_mode, m.height, m.views, m.continuous, m.reverse, u
     )
@@ -146,9 +173,9 @@ def row_views(r, width, m, u, out):
 @kernel
 def _interlace_rows(views, m, flip_x, flip_y, rows, out):
     height, width = out.shape[0], out.shape[1]
-    u, view = np.empty((width, 3)), np.empty(3 * width, np.int32)
+    u, view, steps = np.empty((width, 3)), np.empty(3 * width, np.int32), steps_along(width, m)
     for r in range(rows[0], rows[1]):
-        row_views(r, width, m, u, view)
+        row_views(r, width, m, steps, u, view)
         source, target = views[:, height - 1 - r if flip_y else r], out[r]
         for x in range(width):
             column = width - 1 - x if flip_x else x
@@ -185,9 +212,9 @@ def interlace(
 @kernel
 def _merge_rows(picture, index, m, flips, rows, out):
     height, width = out.shape[0], out.shape[1]
-    u, view = np.empty((width, 3)), np.empty(3 * width, np.int32)
+    u, view, steps = np.empty((width, 3)), np.empty(3 * width, np.int32), steps_along(width, m)
     for r in range(rows[0], rows[1]):
-        row_views(r, width, m, u, view)
+        row_views(r, width, m, steps, u, view)
         source, target = picture[height - 1 - r if flips[1] else r], out[r]
         for x in range(width):
             column = width - 1 - x if flips[0] else x
@@ -238,14 +265,13 @@ def _nearest_tap(i, count, size, flip):
 @kernel
 def _weave_nearest(quilt, tiles, m, flips, rows, out):
     height, width = out.shape[0], out.shape[1]
-    u, view = np.empty((width, 3)), np.empty(3 * width, np.int32)
-    start = np.empty(m.views, np.int64)
-    column = np.empty(3 * width, np.int64)
+    u, view, steps = np.empty((width, 3)), np.empty(3 * width, np.int32), steps_along(width, m)
+    start, column = np.empty(m.views, np.int64), np.empty(3 * width, np.int64)
     for x in range(width):
         for c in range(3):
             column[3 * x + c] = _nearest_tap(x, width, tiles.width, flips[0]) * tiles.channels + c
     for r in range(rows[0], rows[1]):
-        row_views(r, width, m, u, view)
+        row_views(r, width, m, steps, u, view)
         _tile_rows(tiles, _nearest_tap(r, height, tiles.height, flips[1]), start)
         target = out[r].reshape(-1)
         for i in range(3 * width):

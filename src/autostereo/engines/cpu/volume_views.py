@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .gather import row_views
+from .gather import row_views, steps_along
 from .jit import inlined, kernel, lean
 from .simd import LANES, greater, lesser, load, mask_word, splat, store, to_float, to_int
 from .volume_blend import blend_group, clear_line, even_out, load_sums
@@ -303,13 +303,14 @@ def draw_woven_rows(rows, cut, camera, slices, ways, offsets, groups, planes, sl
     """
     viewmap, flip_x, flip_y, u, shown_views = weave
     height, width, _ = color.shape
+    steps = steps_along(width, viewmap)
     for r in range(rows[0], rows[1]):
         row = ((camera.centre_y - (r + 0.5)) / camera.fy - camera.offset_y / camera.focal, camera.offset_y)
         if mark_runs(cut, row, slices, planes.marks) == 0:
             continue
         sum_views(cut, camera, row, slices, ways, width, offsets, groups, planes, slabs, rays, packed, line)
         shown = height - 1 - r if flip_y else r
-        row_views(shown, width, viewmap, u, shown_views)
+        row_views(shown, width, viewmap, steps, u, shown_views)
         for x in range(width):
             i = width - 1 - x if flip_x else x
             for c in range(3):
