@@ -33,11 +33,12 @@ from .panel_lines import BUCKET, LinePlan, line_capacity, plan_lines
 from .panel_list import STRIDE, Block
 from .scene_arrays import SceneArrays, background_word, light_array, scene_arrays
 from .simd import LANES
-from .threads import CHUNKS_PER_THREAD, run_rows
+from .threads import run_rows
 
 BAND_BYTES = 320_000  # of the samples of a row of all views: with what else a row touches they stay in L2
 PANEL_COLUMNS = 2048  # most pixels of a panel's block
 VERTEX_CHUNK = 4096
+CHUNKS = 4  # of triangles that a thread sorts into bins
 _counting = threading.Lock()
 
 
@@ -255,7 +256,7 @@ def _binned(
     """Visible triangles, and the triangles of each bin in the order of faces."""
     arrays, memory = held
     faces, face_ids, vertices = mesh
-    chunks = max(1, min(CHUNKS_PER_THREAD * numba.get_num_threads(), len(faces) // 4096))
+    chunks = max(1, min(CHUNKS * numba.get_num_threads(), len(faces) // 4096))
     edges = np.linspace(0, len(faces), chunks + 1).astype(np.int64)
     count_bins = int(camera.height) * bins[3]
     counts = np.zeros((chunks, count_bins), np.int64)

@@ -100,8 +100,8 @@ def light_vertices(first, last, scene, eye_from_world, camera, lights, attribute
         ey = e[1, 0] * nx + e[1, 1] * ny + e[1, 2] * nz
         ez = e[2, 0] * nx + e[2, 1] * ny + e[2, 2] * nz
         vy = camera.offset_y - y
-        v = 1.0 / max(np.sqrt(x * x + vy * vy + z * z), 1e-30)
         material = scene.materials[scene.vertex_material[i]]
+        v = 1.0 / max(np.sqrt(x * x + vy * vy + z * z), 1e-30) if material[2] > 0.0 else 0.0
         for side in range(sides):
             sign = 1.0 - 2.0 * side
             dr, dg, db, sr, sg, sb = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -248,18 +248,29 @@ def cull_and_count(chunk, faces, face_ids, vertices, scene, camera, span, bins, 
         out[kept, 4] = max(left - margin, 0.0)
         out[kept, 5] = min(right + margin, camera.width - 1.0)
         out[kept, 6], out[kept, 7] = row0, row1
+        block0, block1 = blocks_of(out[kept, 4], out[kept, 5], columns, blocks)
+        for row in range(out[kept, 6], out[kept, 7]):
+            for block in range(row * blocks + block0, row * blocks + block1 + 1):
+                counts[block] += 1
         kept += 1
-        for row in range(out[kept - 1, 6], out[kept - 1, 7]):
-            for block in range(out[kept - 1, 4] // columns, out[kept - 1, 5] // columns + 1):
-                counts[row * blocks + block] += 1
     return kept - first
+
+
+@kernel
+def blocks_of(left, right, columns, blocks):
+    """Blocks of columns that hold the first and the last pixel."""
+    if blocks == 1:
+        return 0, 0
+    inverse = 1.0 / columns  # exact with half a pixel more, and a division of whole numbers takes longer
+    return int((left + 0.5) * inverse), int((right + 0.5) * inverse)
 
 
 @kernel
 def fill_bins(first, count, triangles, columns, blocks, cursor, bins):
     """Write the indices of triangles first…first+count into their bins, from cursor[bin] on."""
     for k in range(first, first + count):
+        block0, block1 = blocks_of(triangles[k, 4], triangles[k, 5], columns, blocks)
         for row in range(triangles[k, 6], triangles[k, 7]):
-            for block in range(triangles[k, 4] // columns, triangles[k, 5] // columns + 1):
-                bins[cursor[row * blocks + block]] = k
-                cursor[row * blocks + block] += 1
+            for block in range(row * blocks + block0, row * blocks + block1 + 1):
+                bins[cursor[block]] = k
+                cursor[block] += 1
