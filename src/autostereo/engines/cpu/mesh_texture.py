@@ -37,7 +37,8 @@ def bilinear(texels, first, width, height, s, t):
     y = (ONE - t) * np.float32(height) - HALF
     x0, y0 = np.floor(x), np.floor(y)
     fx, fy = x - x0, y - y0
-    i0, j0 = np.int64(x0) % width, np.int64(y0) % height
+    i0, j0 = np.int64(x0), np.int64(y0)  # -1 … size - 1; of NaN far below 0
+    i0, j0 = i0 if i0 >= 0 else width - 1, j0 if j0 >= 0 else height - 1
     i1, j1 = i0 + 1 if i0 + 1 < width else 0, j0 + 1 if j0 + 1 < height else 0
     row0, row1 = first + j0 * width, first + j1 * width
     a, b = texels[np.uint64(row0 + i0)], texels[np.uint64(row0 + i1)]
