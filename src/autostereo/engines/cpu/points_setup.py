@@ -150,6 +150,7 @@ def place_surfels(span, arrays, view, camera, grid, records, words, backs, range
     """
     e, m = view.eye_from_world, view.turn
     scale = 1.0 / camera.focal
+    bands, columns = 1.0 / grid.rows, 1.0 / grid.columns
     for i in range(span[0], span[1]):
         ranges[i, 0], ranges[i, 1] = 0, 0
         wx, wy, wz = arrays.positions[i, 0], arrays.positions[i, 1], arrays.positions[i, 2]
@@ -223,9 +224,10 @@ def place_surfels(span, arrays, view, camera, grid, records, words, backs, range
         records[i, A], records[i, B], records[i, INVERSE] = a, b, inverse
         words[i, PARTS] = parts | (number << MATERIAL)
         words[i, ROW0], words[i, ROW1] = int(row0), int(row1)
-        ranges[i, 0], ranges[i, 1] = int(row0) // grid.rows, (int(row1) - 1) // grid.rows + 1
-        ranges[i, 2] = int(max(left, 0.0)) // grid.columns
-        ranges[i, 3] = min(int(min(right, camera.width - 1.0)) // grid.columns + 1, grid.blocks)
+        # exact with half a pixel more, and faster than divisions of whole numbers
+        ranges[i, 0], ranges[i, 1] = int((row0 + 0.5) * bands), int((row1 - 0.5) * bands) + 1
+        ranges[i, 2] = int((np.floor(max(left, 0.0)) + 0.5) * columns)
+        ranges[i, 3] = min(int((np.floor(min(right, camera.width - 1.0)) + 0.5) * columns) + 1, grid.blocks)
         for band in range(ranges[i, 0], ranges[i, 1]):
             for block in range(ranges[i, 2], ranges[i, 3]):
                 counts[band * grid.blocks + block] += 1
