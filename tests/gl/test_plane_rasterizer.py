@@ -232,8 +232,7 @@ def test_short_memory_changes_nothing(monkeypatch, limits):
     scene = aus.Scene([*soup().objects, *smooth().objects])
     stack, pixels = views(scene, rig), panel(scene, display, rig)
     for name, value in limits.items():
-        module = plane_rasterizer if name == "MAX_TRIANGLES" else plane_buffers
-        monkeypatch.setattr(module, name, value)
+        monkeypatch.setattr(plane_buffers, name, value)
     for method in (METHOD, "plane-rasterizer-n-pass"):
         assert_same(views(scene, rig, method), stack)
         np.testing.assert_array_equal(panel(scene, display, rig, method), pixels)

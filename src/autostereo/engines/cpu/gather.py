@@ -141,9 +141,11 @@ def steps_along(width, m):
 
 
 @kernel
-def _phase_views(br, along, offset, views, least, reverse, out):
+def _phase_views(r, m, steps, out):
     """`row_views` of a plain phase map in one loop, in the order of operations of `row_camera`; vectorised."""
-    most = views - 1.0
+    along, offset = steps
+    br, views, most, reverse = m.b * r, m.views, m.views - 1.0, m.reverse
+    least = 0.5 if m.continuous else 0.0
     for i in range(out.shape[0]):
         t = along[i] + br + offset[i]
         phi = t - np.floor(t)
@@ -157,7 +159,7 @@ def _phase_views(br, along, offset, views, least, reverse, out):
 def row_views(r, width, m, steps, u, out):
     """Fill out (3W,) int32 with the nearest view of each sub-pixel of row r; u (W, 3) is scratch."""
     if m.table.shape[0] == 0 and (m.offsets.shape[0] == 1 or m.cell_mode == 0):
-        _phase_views(m.b * r, steps[0], steps[1], m.views, 0.5 if m.continuous else 0.0, m.reverse, out)
+        _phase_views(r, m, steps, out)
         return
     row_camera(
         r, width, m.table, m.a, m.b, m.offsets, m.cell_mode, m.height, m.views, m.continuous, m.reverse, u

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..engine import Camera
 from .jit import kernel
+from .scalars import quotient
 
 LIGHT_POINT = 1.0
 
@@ -208,7 +209,7 @@ def cull_and_count(chunk, faces, face_ids, vertices, scene, camera, span, bins, 
     first, last = chunk
     first_sample, last_sample, columns, blocks = bins
     kept = first
-    scale = camera.fx / camera.focal
+    scale, inverse = camera.fx / camera.focal, 1.0 / columns
     for f in range(first, last):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         ya, yb, yc = vertices[a, 1], vertices[b, 1], vertices[c, 1]
@@ -248,7 +249,7 @@ def cull_and_count(chunk, faces, face_ids, vertices, scene, camera, span, bins, 
         out[kept, 4] = max(left - margin, 0.0)
         out[kept, 5] = min(right + margin, camera.width - 1.0)
         out[kept, 6], out[kept, 7] = row0, row1
-        block0, block1 = blocks_of(out[kept, 4], out[kept, 5], columns, blocks)
+        block0, block1 = quotient(out[kept, 4], inverse), quotient(out[kept, 5], inverse)
         for row in range(out[kept, 6], out[kept, 7]):
             for block in range(row * blocks + block0, row * blocks + block1 + 1):
                 counts[block] += 1
@@ -257,19 +258,11 @@ def cull_and_count(chunk, faces, face_ids, vertices, scene, camera, span, bins, 
 
 
 @kernel
-def blocks_of(left, right, columns, blocks):
-    """Blocks of columns that hold the first and the last pixel."""
-    if blocks == 1:
-        return 0, 0
-    inverse = 1.0 / columns  # exact with half a pixel more, and a division of whole numbers takes longer
-    return int((left + 0.5) * inverse), int((right + 0.5) * inverse)
-
-
-@kernel
 def fill_bins(first, count, triangles, columns, blocks, cursor, bins):
     """Write the indices of triangles first…first+count into their bins, from cursor[bin] on."""
+    inverse = 1.0 / columns
     for k in range(first, first + count):
-        block0, block1 = blocks_of(triangles[k, 4], triangles[k, 5], columns, blocks)
+        block0, block1 = quotient(triangles[k, 4], inverse), quotient(triangles[k, 5], inverse)
         for row in range(triangles[k, 6], triangles[k, 7]):
             for block in range(row * blocks + block0, row * blocks + block1 + 1):
                 bins[cursor[block]] = k

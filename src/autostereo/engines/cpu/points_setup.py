@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined, kernel
+from .scalars import quotient
 
 # what is kept of a surfel: 16 words, a cache line
 X, Y, DEPTH, REACH, NX, NY, ND, RED, GREEN, BLUE, A, B, INVERSE = range(13)  # float32
@@ -224,10 +225,9 @@ def place_surfels(span, arrays, view, camera, grid, records, words, backs, range
         records[i, A], records[i, B], records[i, INVERSE] = a, b, inverse
         words[i, PARTS] = parts | (number << MATERIAL)
         words[i, ROW0], words[i, ROW1] = int(row0), int(row1)
-        # exact with half a pixel more, and faster than divisions of whole numbers
-        ranges[i, 0], ranges[i, 1] = int((row0 + 0.5) * bands), int((row1 - 0.5) * bands) + 1
-        ranges[i, 2] = int((np.floor(max(left, 0.0)) + 0.5) * columns)
-        ranges[i, 3] = min(int((np.floor(min(right, camera.width - 1.0)) + 0.5) * columns) + 1, grid.blocks)
+        ranges[i, 0], ranges[i, 1] = quotient(row0, bands), quotient(row1 - 1.0, bands) + 1
+        ranges[i, 2] = quotient(np.floor(max(left, 0.0)), columns)
+        ranges[i, 3] = min(quotient(np.floor(min(right, camera.width - 1.0)), columns) + 1, grid.blocks)
         for band in range(ranges[i, 0], ranges[i, 1]):
             for block in range(ranges[i, 2], ranges[i, 3]):
                 counts[band * grid.blocks + block] += 1

@@ -17,8 +17,8 @@ from ..engine import Target
 from ..gathering import Tiles
 from .atlas import Atlas, Layout
 from .blocks import stored_background
-from .job import CLEARLY, VIEW_PIXEL, Job, Stage
-from .panel import ALL, Mean, Panel
+from .job import CLEARLY, Job, Stage
+from .panel import ALL, NOTHING, Mean, Panel, write_only
 
 CHANNELS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -96,11 +96,10 @@ def _hide(job: Job, tiles: range, channels: tuple[float, ...]) -> None:
     ctx = job.device.ctx
     program = job.masked_program("tile.vert", "hide.frag")
     program["first_view"], program["first_held"], program["channels"] = tiles.start, job.first, channels
-    job.atlas.target.color_mask = (False,) * 4
-    job.atlas.target.use()
+    write_only(job.atlas.target, NOTHING)
     ctx.enable_only(ctx.DEPTH_TEST)
     job.vertex_array(program, []).render(ctx.TRIANGLE_STRIP, vertices=4, instances=len(tiles))
-    job.atlas.target.color_mask = (True,) * 4
+    write_only(job.atlas.target)
 
 
 # --- views ---------------------------------------------------------------------------------------------------
@@ -149,9 +148,8 @@ def by_channels(job: Job, stages: list[Stage]) -> bool:
         return draw.method == "covering-quad"
     if draw.viewmap.continuous or not stages:
         return True
-    views = VIEW_PIXEL * len(draw.offsets) * draw.camera.width * draw.camera.height
     costs = [stage.costs(job) for stage in stages]
-    return sum(channels for _, channels in costs) < CLEARLY * (views + sum(own for own, _ in costs))
+    return sum(channels for _, channels in costs) < CLEARLY * (job.views_cost + sum(own for own, _ in costs))
 
 
 def draw_panel(job: Job, stages: list[Stage], target: Target) -> None:

@@ -87,6 +87,11 @@ class Job:
         quads = self.columns is not None and self.draw.method == "covering-quad"
         return quads and self.draw.options.alpha != "exact"
 
+    @property
+    def views_cost(self) -> float:
+        """Expected seconds of a CPU for the pixels of all views, whatever is drawn into them."""
+        return VIEW_PIXEL * len(self.draw.offsets) * self.draw.camera.width * self.draw.camera.height
+
     def with_atlas(
         self, atlas: Atlas, first: int, count: int, positions: tuple[tuple[float, ...] | None, float] = (None, 0.5)
     ) -> Job:

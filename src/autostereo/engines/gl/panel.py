@@ -14,6 +14,7 @@ from .job import Job
 from .programs import Defines
 
 ALL = (1.0, 1.0, 1.0)
+NOTHING, EVERYTHING = (False,) * 4, (True,) * 4  # channels that are written
 
 
 class Panel:
@@ -85,7 +86,7 @@ class Panel:
         read_into(self.target, out)
 
 
-def write_only(target: Any, mask: tuple[bool, ...] = (True,) * 4) -> None:
+def write_only(target: Any, mask: tuple[bool, ...] = EVERYTHING) -> None:
     """Draw to a framebuffer, and write all its colours in these channels alone."""
     count = len(target.color_attachments)
     target.color_mask = mask if count == 1 else (mask,) * count

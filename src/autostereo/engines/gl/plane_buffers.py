@@ -120,32 +120,33 @@ class Queue:
 
 
 class Voxels:
-    """Depth and winner of every sample of a round."""
+    """Depth and winner of every sample of a round.
+
+    Attributes
+    ----------
+    blank : moderngl.Buffer, optional
+        What `copy_blank` copies; None where a shader clears.
+    """
 
     def __init__(self, device: Device, samples: int) -> None:
         self.depths, self.winners = (Memory(device, samples, 1, "u4") for _ in range(2))
 
-        self._blank = None if device.is_hardware else device.ctx.buffer(b"\xff" * (4 * MEMORY_WIDTH * BLANK_ROWS))
+        # software devices copy several times faster than their shaders write; GPUs copy to textures at a hundredth of
+        # their memory's speed
+        self.blank = None if device.is_hardware else device.ctx.buffer(b"\xff" * (4 * MEMORY_WIDTH * BLANK_ROWS))
 
     def bind(self) -> None:
         """Bind both to their image units."""
         self.depths.bind(2)
         self.winners.bind(3)
 
-    def clear(self) -> bool:
-        """Set all bits, greater than any depth or number, if that is done by copying.
-
-        Software devices copy several times faster than their shaders write; GPUs copy to textures at a hundredth of
-        their memory's speed.
-        """
-        if self._blank is None:
-            return False
+    def copy_blank(self) -> None:
+        """Set all bits, greater than any depth or number, where that is done by copying (else plane_clear.comp)."""
         for memory in (self.depths, self.winners):
             height = memory.texture.height
             for first in range(0, height, BLANK_ROWS):
                 box = (0, first, MEMORY_WIDTH, min(BLANK_ROWS, height - first))
-                memory.texture.write(self._blank, box)
-        return True
+                memory.texture.write(self.blank, box)
 
 
 class Corners:

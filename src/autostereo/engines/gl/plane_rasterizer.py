@@ -29,14 +29,13 @@ import numpy as np
 
 from ...errors import UnsupportedError
 from ...scene.mesh import Mesh
-from .job import CLEARLY, VIEW_PIXEL, Job
+from .job import CLEARLY, Job
 from .mesh import Meshes, set_material, switches
-from .panel import Panel
+from .panel import NOTHING, Panel, write_only
 from .plane_buffers import (
     BLOCK_VIEWS,
     MAX_BLOCKS,
     MAX_SIDE,
-    MAX_TRIANGLES,
     PANEL_BLOCKS,
     TRIANGLE_TEXELS,
     Corners,
@@ -126,9 +125,9 @@ class PlaneMeshes(Meshes):
 
     def _least_other(self, job: Job) -> float:
         """Seconds that any other way is expected to take, less a margin."""
-        draw, camera = job.draw, job.draw.camera
+        draw = job.draw
         views, channels = self.costs(job)
-        views += VIEW_PIXEL * len(draw.offsets) * camera.width * camera.height
+        views += job.views_cost
         if draw.viewmap is None:
             return CLEARLY * views
         return CLEARLY * (channels if draw.viewmap.continuous else min(views, channels))
@@ -158,11 +157,10 @@ class Drawing:
         self.job, self.parts = job, parts
         kept, device = job.kept, job.device
         self.numbers = np.cumsum([0, *(part.triangles for part in parts)])
-        count = int(self.numbers[-1])
         self.queue = kept.get("plane queue", None, lambda: Queue(device))
-        self.queue.grow(count)
+        self.queue.grow(int(self.numbers[-1]))
         self.chunks = chunks(parts, self.queue.most)
-        self.room = room = 2 * min(count, MAX_TRIANGLES)
+        self.room = room = 2 * max(sum(piece[2] for piece in chunk) for chunk in self.chunks)
         self.triangles = kept.get("plane triangles", room, lambda: Memory(device, TRIANGLE_TEXELS * room, 4, "u4"))
         self.corners = kept.get("plane corners", None, self._send_corners)
         self.one_view = job.draw.method == ONE_VIEW
@@ -207,7 +205,8 @@ class Drawing:
             self._encode(part, 0, panel.color)
 
     def _passes(self) -> Iterator[Pass]:
-        step = 1 if self.one_view else MAX_BLOCKS
+        bands = -(-self.job.draw.camera.height // 16)  # of large triangles: a dispatch's z is block and band
+        step = 1 if self.one_view else min(MAX_BLOCKS, GROUPS // bands)
         for first in range(0, len(self.blocks), step):
             some = self.blocks[first : first + step, 4:6]
             yield Pass(first, len(some), (float(some[0, 0]), float(some[-1, 1])))
@@ -219,7 +218,9 @@ class Drawing:
         voxels = self.job.kept.get("plane voxels", samples, lambda: Voxels(self.job.device, samples))
         voxels.bind()
         with _stage(self.job, "clear"):
-            if not voxels.clear():
+            if voxels.blank is not None:
+                voxels.copy_blank()
+            else:
                 program = self.job.program("plane_clear.comp", version=VERSION)
                 _set(program, count=samples)
                 _run(program, samples)
@@ -337,11 +338,10 @@ class Drawing:
         program = job.program("tile.vert", "plane_depth.frag", version=VERSION)
         _set(program, first_view=tiles.start, first_tile=tiles.start, plane_count=part.planes)
         _set(program, picture=(part.width, part.rows), first_row=part.first_row)
-        job.atlas.target.color_mask = (False,) * 4
-        job.atlas.target.use()
+        write_only(job.atlas.target, NOTHING)
         ctx.enable_only(ctx.DEPTH_TEST)
         job.vertex_array(program, []).render(ctx.TRIANGLE_STRIP, vertices=4, instances=len(tiles))
-        job.atlas.target.color_mask = (True,) * 4
+        write_only(job.atlas.target)
 
 
 def views_of_a_block(job: Job) -> int:

@@ -36,7 +36,7 @@ from ..volumes import Slices, make_slices
 from .beneath import Beneath
 from .context import Device
 from .job import Job, Stage
-from .panel import Panel, write_only
+from .panel import EVERYTHING, NOTHING, Panel, write_only
 from .programs import Defines
 from .volume_data import TABLE, Look, is_shaded, make_table, place_in, send, table_range
 from .volume_slices import slices_on_panel, slices_on_tiles
@@ -94,11 +94,11 @@ class Rays(Stage):
             test = job.device.ctx.DEPTH_TEST if self.opaque or job.mask is not None else job.device.ctx.NOTHING
             render(job, program, (job.atlas.target, test, self.opaque), len(tiles))
             if job.draw.options.depth and not self.opaque:
-                job.atlas.target.color_mask = (False,) * 4
+                write_only(job.atlas.target, NOTHING)
                 program = self._program(job, group, slices, beneath, half_depth=True)
                 program["first_view"] = tiles.start
                 render(job, program, (job.atlas.target, job.device.ctx.DEPTH_TEST, True), len(tiles))
-                job.atlas.target.color_mask = (True,) * 4
+                write_only(job.atlas.target)
 
     def draw_panel(self, job: Job, panel: Panel) -> None:
         """Draw the sub-pixels of a panel."""
@@ -254,7 +254,7 @@ def apart(job: Job, group: list[Volume]) -> bool:
 def masks(job: Job, group: list[Volume]) -> tuple[tuple[bool, ...], ...]:
     """What of a panel's colours each draw of a group writes."""
     if lanes(job, group) == 3 or same_rays(job):
-        return ((True,) * 4,)
+        return (EVERYTHING,)
     return tuple((*(c == channel for c in range(3)), True) for channel in range(3))
 
 

@@ -2,13 +2,14 @@
 #define DEPTHS
 #define WINNERS
 #include "lib/plane_memory.glsl"
+#include "lib/invocation.glsl"
 
 layout(local_size_x = 64) in;
 
 uniform uint count;
 
 void main() {
-    uint k = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
+    uint k = invocation();
     if (k < count) {
         imageStore(depths, place_of(k), uvec4(0xffffffffu));
         imageStore(winners, place_of(k), uvec4(0xffffffffu));

@@ -5,6 +5,7 @@
 #include "lib/plane_memory.glsl"
 #include "lib/plane_triangle.glsl"
 #include "lib/plane_pass.glsl"
+#include "lib/invocation.glsl"
 
 layout(local_size_x = 64) in;
 

@@ -5,6 +5,7 @@
 #include "lib/plane_memory.glsl"
 #include "lib/viewmap.glsl"
 #include "lib/cameras.glsl"
+#include "lib/invocation.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -14,7 +15,7 @@ uniform ivec2 grouping;  // views per block, blocks
 
 void main() {
     ivec2 tiles = (picture + 3) >> 2;
-    int k = int(gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64 + int(gl_LocalInvocationID.x);
+    int k = int(invocation());
     if (k >= tiles.x * tiles.y) {
         return;
     }

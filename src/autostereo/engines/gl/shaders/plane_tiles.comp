@@ -19,6 +19,7 @@
 #include "lib/plane_pass.glsl"
 #include "lib/plane_tile.glsl"
 #include "lib/plane_coverage.glsl"
+#include "lib/invocation.glsl"
 
 layout(local_size_x = 64) in;
 

@@ -5,6 +5,7 @@
 #include "lib/surface.glsl"
 #include "lib/plane_memory.glsl"
 #include "lib/plane_surface.glsl"
+#include "lib/invocation.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -19,7 +20,7 @@ const int SIZE =
 #endif
 
 void main() {
-    int k = int(gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64 + int(gl_LocalInvocationID.x);
+    int k = int(invocation());
     if (k >= count) {
         return;
     }

@@ -14,8 +14,3 @@ uniform int first_row;     // of this round
 uniform ivec4 pass_views;  // first block, blocks of this pass; views per block; views in all
 uniform vec4 sample_at;    // where in a pixel samples are: x of three channels, y
 uniform int plane_count;   // views of the pass, or channels: samples of a tile lie together
-
-// Number of this invocation in a dispatch whose size has been spread over x and y.
-uint invocation() {
-    return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
-}
