@@ -20,87 +20,19 @@ from autostereo.engines.reference import gather as reference
 from autostereo.errors import InputError
 from autostereo.frame import ViewStack
 from autostereo.viewmap import ViewMap
+from view_maps import EVERY, PHASES, STRIPE, TABLES, phase_maps
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "benchmarks" / "peers"))
 import weave_numpy
 
-R, X = np.arange(12)[:, None, None], np.arange(24)[None, :, None]
-C = np.arange(3)
-S = 3 * X + C
-WAVELENGTH = ((1 + (R + 1) % 12 + (R + 1) % 12 // 3) // 2 + 3 * X % 8 + C) % 8
-TABLES = {
-    "per pixel": ViewMap(8, table=(X + 0 * (R + C)) % 8),
-    "sub-pixel 5": ViewMap(5, table=(S + 0 * R)[:, :15] % 5),
-    "de Sorbier 4b": ViewMap(6, table=(2 * S - R)[:6, :2] % 6),
-    "wavelength-selective": ViewMap(8, table=WAVELENGTH[:, :8]),
-    "Alioscopy": ViewMap(8, table=(S - R)[:8, :8] % 8),
-    "one view": ViewMap(1, table=np.zeros((1, 1, 3), int)),
-}
-STRIPE = np.array([[0.37, 0.37 + 1 / 19, 0.37 + 2 / 19]])
-CELLS = np.array([[0.1, 0.25, 0.4], [0.2, 0.3, 0.15], [0.7, 0.6, 0.9], [0.05, 0.5, 0.95]])
-PHASES = {
-    "slanted": ViewMap(9, a=0.161, b=-0.0221, offsets=STRIPE),
-    "continuous": ViewMap(9, a=0.161, b=0.0221, offsets=STRIPE, continuous=True),
-    "running left": ViewMap(48, a=-0.161, b=0.01, offsets=STRIPE),
-    "exact wraps": ViewMap(4, a=0.25, b=0.5, offsets=np.array([[0.0, 0.25, 0.5]])),
-} | {f"cells {mode}": ViewMap(7, a=0.15, b=0.02, offsets=CELLS, cell_mode=mode, height=13) for mode in range(5)}
-MAPS = TABLES | PHASES
-EVERY = pytest.mark.parametrize("viewmap", [replace(m, reverse=v) for m in MAPS.values() for v in (False, True)])
 FLIPS = pytest.mark.parametrize("flips", [(False, False), (True, False), (False, True), (True, True)])
 
 
-@st.composite
-def phase_maps(draw):
-    number = st.floats(-3, 3)
-    mode = draw(st.integers(0, 4))
-    offsets = draw(st.lists(st.tuples(number, number, number), min_size=1, max_size=4))
-    return ViewMap(
-        draw(st.integers(1, 130)),
-        a=draw(number),
-        b=draw(number),
-        offsets=np.array(offsets),
-        cell_mode=mode,
-        height=13,
-        continuous=draw(st.booleans()),
-        reverse=draw(st.booleans()),
-    )
 
 
 def random_pixels(*shape: int, seed: int = 0) -> np.ndarray:
     return np.random.default_rng(seed).integers(0, 256, shape, dtype=np.uint8)
 
-
-def row_cameras(viewmap: ViewMap, height: int, width: int) -> np.ndarray:
-    out = np.empty((height, width, 3))
-    for r in range(height):
-        cpu.row_camera(r, width, *cpu.map_args(viewmap), out[r])
-    return out
-
-
-# --- the view map, row by row -------------------------------------------------------------------------------
-
-
-@EVERY
-def test_row_camera_is_view_map_camera(viewmap):
-    assert np.array_equal(row_cameras(viewmap, 13, 29), viewmap.camera(np.arange(13), np.arange(29)))
-
-
-@EVERY
-def test_row_phase_is_view_map_phase(viewmap):
-    out = np.empty((29, 3))
-    for r in range(13):
-        cpu.row_phase(r, 29, *cpu.map_args(viewmap), out)
-        if viewmap.table is None:
-            assert np.array_equal(out, viewmap.phase([r], np.arange(29))[0])
-        else:
-            assert np.array_equal(np.floor(out * viewmap.views), viewmap.view([r], np.arange(29))[0])
-        assert out.min() >= 0 and out.max() < 1
-
-
-@settings(max_examples=60, deadline=None)
-@given(phase_maps())
-def test_any_phase_map_agrees_bit_for_bit(viewmap):
-    assert np.array_equal(row_cameras(viewmap, 13, 17), viewmap.camera(np.arange(13), np.arange(17)))
 
 
 # --- interlace -----------------------------------------------------------------------------------------------

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import autostereo as aus
-from autostereo.engines.cpu.gather import map_args, row_camera
 from autostereo.engines.cpu.jit import kernel
+from autostereo.engines.cpu.view_rows import map_args, row_camera
 from autostereo.engines.gl.blocks import Mask, attach
 from autostereo.engines.gl.programs import expand
 from autostereo.viewmap import ViewMap
@@ -20,7 +20,7 @@ BAND = 512  # rows that are compared at a time
 
 @kernel
 def fill_cameras(first, width, m, out):
-    """`ViewMap.camera` of rows from `first` on: out (R, W, 3); engines/cpu/gather.py, which tests hold to NumPy's."""
+    """`ViewMap.camera` of rows from `first` on: out (R, W, 3); engines/cpu/view_rows.py, which tests hold to NumPy."""
     table, a, b, offsets, mode, height, views, continuous, reverse = m
     for r in range(out.shape[0]):
         row_camera(first + r, width, table, a, b, offsets, mode, height, views, continuous, reverse, out[r])

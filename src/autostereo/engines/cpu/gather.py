@@ -1,13 +1,9 @@
 """Gather: from V pictures, or a quilt of them, to the panel.
 
-A view map is evaluated row by row (`row_phase`, `row_camera`), so that no array but the pictures is as large as a
-panel. Float64 throughout where a view is decided, in the order of operations of `ViewMap`: the chosen views are
-bit-identical with NumPy's.
+A view map is evaluated row by row (`view_rows`), so that no array but the pictures is as large as a panel.
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,157 +12,9 @@ from ...viewmap import ViewMap
 from ..gathering import check_interlace, quilt_tiles
 from .jit import kernel
 from .threads import run_rows
+from .view_rows import map_args, row_camera, row_views, steps_along
 
-
-class MapArgs(NamedTuple):
-    """A ViewMap as kernels take it; a phase map has an empty table (0, 0, 3)."""
-
-    table: NDArray[np.int32]
-    a: float
-    b: float
-    offsets: NDArray[np.float64]
-    cell_mode: int
-    height: int
-    views: int
-    continuous: bool
-    reverse: bool
-
-
-def map_args(viewmap: ViewMap) -> MapArgs:
-    """Return the arguments `table … reverse` of `row_phase` and `row_camera`, of one type for every map."""
-    table = np.zeros((0, 0, 3), np.int32) if viewmap.table is None else viewmap.table
-    offsets = np.zeros((1, 3)) if viewmap.offsets is None else viewmap.offsets
-    return MapArgs(
-        table,
-        float(viewmap.a),
-        float(viewmap.b),
-        offsets,
-        int(viewmap.cell_mode),
-        int(viewmap.height),
-        int(viewmap.views),
-        bool(viewmap.continuous),
-        bool(viewmap.reverse),
-    )
-
-
-@kernel
-def cell_of(mode, x, y):
-    """`viewmap.cell_index` of one pixel, y counted from the bottom."""
-    if mode == 1:
-        return (x + y) % 2
-    if mode == 2:
-        return x % 2
-    if mode == 3:
-        return (y + 2 * (x % 2)) % 4
-    if mode == 4:
-        return y % 2
-    return 0
-
-
-@kernel
-def _wrap(flat, reverse):
-    """Replace each t by its fraction in [0, 1), mirrored if `reverse` (0 stays 0). Alone, this loop is vectorised."""
-    for i in range(flat.shape[0]):
-        phi = flat[i] - np.floor(flat[i])
-        if reverse:
-            phi = 1.0 - phi
-        flat[i] = phi if phi < 1.0 else 0.0  # 1 − 1e-17 rounds to 1
-
-
-@kernel
-def row_phase(r, width, table, a, b, offsets, cell_mode, height, views, continuous, reverse, out):
-    """Fill out (W, 3) float64, C-contiguous, with the phases φ ∈ [0, 1) of row r; a table's phase is (view + ½)/V.
-
-    `table … reverse` are those of `map_args`; equals `ViewMap.phase` bit for bit.
-    """
-    if table.shape[0] > 0:
-        row = table[r % table.shape[0]]
-        for x in range(width):
-            entry = x % table.shape[1]
-            for c in range(3):
-                view = row[entry, c]
-                out[x, c] = ((views - 1 - view if reverse else view) + 0.5) / views
-        return
-    br = b * r
-    if offsets.shape[0] == 1 or cell_mode == 0:
-        o0, o1, o2 = offsets[0, 0], offsets[0, 1], offsets[0, 2]
-        for x in range(width):
-            t = a * x + br
-            out[x, 0] = t + o0
-            out[x, 1] = t + o1
-            out[x, 2] = t + o2
-    else:
-        y = height - 1 - r
-        for x in range(width):
-            t = a * x + br
-            cell = cell_of(cell_mode, x, y) % offsets.shape[0]
-            for c in range(3):
-                out[x, c] = t + offsets[cell, c]
-    _wrap(out.reshape(-1), reverse)
-
-
-@kernel
-def row_camera(r, width, table, a, b, offsets, cell_mode, height, views, continuous, reverse, out):
-    """Fill out (W, 3) float64, C-contiguous, with the camera coordinates u of row r; whole if the map is discrete.
-
-    `table … reverse` are those of `map_args`; equals `ViewMap.camera` bit for bit.
-    """
-    if table.shape[0] > 0:
-        row = table[r % table.shape[0]]
-        for x in range(width):
-            entry = x % table.shape[1]
-            for c in range(3):
-                view = row[entry, c]
-                out[x, c] = views - 1 - view if reverse else view
-        return
-    row_phase(r, width, table, a, b, offsets, cell_mode, height, views, continuous, reverse, out)
-    flat = out.reshape(-1)
-    if continuous:
-        for i in range(3 * width):
-            flat[i] = flat[i] * views - 0.5
-    else:
-        for i in range(3 * width):
-            flat[i] = min(np.floor(flat[i] * views), views - 1.0)
-
-
-@kernel
-def steps_along(width, m):
-    """Return a·x and the offset of every sub-pixel of a row, (3W,) float64: the same in all rows; for `row_views`."""
-    along, offset = np.empty(3 * width), np.empty(3 * width)
-    for x in range(width):
-        for c in range(3):
-            along[3 * x + c] = m.a * x
-            offset[3 * x + c] = m.offsets[0, c]
-    return along, offset
-
-
-@kernel
-def _phase_views(r, m, steps, out):
-    """`row_views` of a plain phase map in one loop, in the order of operations of `row_camera`; vectorised."""
-    along, offset = steps
-    br, views, most, reverse = m.b * r, m.views, m.views - 1.0, m.reverse
-    least = 0.5 if m.continuous else 0.0
-    for i in range(out.shape[0]):
-        t = along[i] + br + offset[i]
-        phi = t - np.floor(t)
-        if reverse:
-            phi = 1.0 - phi
-        phi = phi if phi < 1.0 else 0.0
-        out[i] = np.int32(min(phi * views - least + least, most))
-
-
-@kernel
-def row_views(r, width, m, steps, u, out):
-    """Fill out (3W,) int32 with the nearest view of each sub-pixel of row r; u (W, 3) is scratch."""
-    if m.table.shape[0] == 0 and (m.offsets.shape[0] == 1 or m.cell_mode == 0):
-        _phase_views(r, m, steps, out)
-        return
-    row_camera(
-        r, width, m.table, m.a, m.b, m.offsets, m.cell_mode, m.height, m.views, m.continuous, m.reverse, u
-    )
-    flat = u.reshape(-1)
-    for i in range(3 * width):
-        out[i] = np.int32(min(flat[i] + 0.5, m.views - 1.0))  # u ≥ −½, so truncation rounds down
+CACHE_LINE = 64  # bytes
 
 
 # --- interlace -----------------------------------------------------------------------------------------------
@@ -265,19 +113,36 @@ def _nearest_tap(i, count, size, flip):
 
 
 @kernel
+def _touch(quilt, start, count):
+    """Read a byte of each cache line of one row of every tile: in order they come many times as fast as one by one."""
+    total = np.uint64(0)
+    for k in range(start.shape[0]):
+        for i in range(0, count, CACHE_LINE):
+            total += np.uint64(quilt[np.uint64(start[k] + i)])
+    return total
+
+
+@kernel
 def _weave_nearest(quilt, tiles, m, flips, rows, out):
     height, width = out.shape[0], out.shape[1]
     u, view, steps = np.empty((width, 3)), np.empty(3 * width, np.int32), steps_along(width, m)
-    start, column = np.empty(m.views, np.int64), np.empty(3 * width, np.int64)
+    start, column = np.empty(m.views, np.uint64), np.empty(width, np.uint64)
     for x in range(width):
-        for c in range(3):
-            column[3 * x + c] = _nearest_tap(x, width, tiles.width, flips[0]) * tiles.channels + c
+        column[x] = _nearest_tap(x, width, tiles.width, flips[0]) * tiles.channels
+    shown, touched = -1, np.uint64(0)
     for r in range(rows[0], rows[1]):
         row_views(r, width, m, steps, u, view)
-        _tile_rows(tiles, _nearest_tap(r, height, tiles.height, flips[1]), start)
+        j = _nearest_tap(r, height, tiles.height, flips[1])
+        if j != shown:
+            _tile_rows(tiles, j, start)
+            touched |= _touch(quilt, start, tiles.width * tiles.channels)
+            shown = j
         target = out[r].reshape(-1)
-        for i in range(3 * width):
-            target[i] = quilt[np.uint64(start[view[i]] + column[i])]  # unsigned: no test for negative indices
+        for x in range(np.uint64(width)):
+            i = np.uint64(3) * x
+            for c in range(np.uint64(3)):
+                target[i + c] = quilt[start[np.uint64(view[i + c])] + column[x] + c]
+    return touched
 
 
 @kernel

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from ...viewmap import ViewMap
 from ..gathering import TIE, check_observe, lens_size
-from .gather import map_args, row_phase
 from .jit import kernel
 from .threads import run_rows
+from .view_rows import map_args, row_phase
 
 
 @kernel

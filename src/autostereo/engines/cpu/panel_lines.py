@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...viewmap import ViewMap, offset_at
-from .gather import MapArgs, cell_of, map_args
 from .jit import inlined, kernel
+from .view_rows import MapArgs, cell_of, map_args
 
 MAX_PERIOD = 64
 NEAR_WRAP = 1e-6  # of a phase: rounding may put a sample on either side of a wrap, so both lines hold it
@@ -110,7 +110,7 @@ def start_phase(m, row, x):
 def row_offsets(row, width, flip, columns, base, x0, plane, plan, u, out):
     """Camera offsets of pixels `columns` of a physical row, channel c's of pixel x at out[base + c·plane + x − x0].
 
-    The phase is that of `gather.row_phase`, bit for bit; u (W,) float64 is scratch.
+    The phase is that of `view_rows.row_phase`, bit for bit; u (W,) float64 is scratch.
     """
     m, offsets = plan.map, plan.offsets
     a, b, views, reverse = m.a, m.b, np.float64(m.views), m.reverse

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ..engine import Camera, Draw
 from ..volumes import Slices, make_slices
-from .gather import map_args
 from .kernels import is_joined, is_woven
 from .memory import Memory
 from .mesh import panel_lines
@@ -19,6 +18,7 @@ from .mesh_panel import Panel
 from .mesh_setup import camera_numbers
 from .panel_lines import LinePlan
 from .threads import run_rows
+from .view_rows import map_args
 from .volume_cut import (
     PreparedVolumes,
     is_shared,

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .gather import row_views, steps_along
 from .jit import inlined, kernel, lean
 from .simd import LANES, greater, lesser, load, mask_word, splat, store, to_float, to_int
+from .view_rows import row_views, steps_along
 from .volume_blend import blend_group, clear_line, even_out, load_sums
 from .volume_modes import NONE, march_iso, march_mip, resolve_iso, resolve_mip
 from .volume_rays import (
