@@ -7,7 +7,7 @@ TINY = 1e-30  # stands in for a squared length of 0 under a root or a quotient: 
 MAX_CELLS = 4  # cells of sub-pixels that differ in phase: no pattern of displays.md 3.3 has more
 ATLAS_VIEWS = 512  # views of one atlas: their offsets and tiles have to fit into a uniform block of 16 KB
 MAX_CAMERAS = 4096  # views of a panel, render.MAX_VIEWS: their offsets fill a uniform block of 16 KB
-MEMORY_WIDTH = 4096  # columns of pictures that hold arrays of the plane rasteriser
+MEMORY_WIDTH = 4096  # columns of pictures that hold arrays (gl/memory.py)
 
 # Volumes on the gl engine (gl/volume*.py)
 BLOCK_BITS = 2  # log2 of the edge of a block of cells that are skipped together

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...viewmap import offset_at
-from ..constants import MEMORY_WIDTH
 from .context import Device
 from .job import Job
+from .memory import Memory
 from .mesh_buffers import Part
 
 BLOCK_VIEWS = 4  # views of a tile (PMR 2020, section 4: 4×4×4 voxels)
@@ -26,7 +26,6 @@ TRIANGLE_TEXELS = 4  # of lib/plane_triangle.glsl
 SURFACE_TEXELS = 4  # of lib/plane_surface.glsl
 FIRST_ROOM = 2**16  # entries that the queue holds at first
 COUNTERS = 4 * (8 + 15)  # bytes
-BLANK_ROWS = 256  # that are set at once
 Piece = tuple[int, int, int]  # part, its first triangle, how many
 
 
@@ -43,19 +42,6 @@ class Round:
     def tiles(self) -> int:
         """Tiles of 4×4 pixels."""
         return -(-self.width // 4) * -(-self.rows // 4)
-
-
-class Memory:
-    """An array of `count` elements that shaders read and write, as a picture (lib/plane_memory.glsl)."""
-
-    def __init__(self, device: Device, count: int, components: int, dtype: str) -> None:
-        rows = max(1, -(-count // MEMORY_WIDTH))
-        device.check_texture((MEMORY_WIDTH, rows), "memory of the plane rasteriser")
-        self.texture = device.ctx.texture((MEMORY_WIDTH, rows), components, dtype=dtype)
-
-    def bind(self, unit: int) -> None:
-        """Bind it to an image unit."""
-        self.texture.bind_to_image(unit)
 
 
 def rounds(size: tuple[int, int], planes: int, blocks: int) -> Iterator[Round]:
@@ -120,33 +106,17 @@ class Queue:
 
 
 class Voxels:
-    """Depth and winner of every sample of a round.
-
-    Attributes
-    ----------
-    blank : moderngl.Buffer, optional
-        What `copy_blank` copies; None where a shader clears.
-    """
+    """Depth and winner of every sample of a round."""
 
     def __init__(self, device: Device, samples: int) -> None:
         self.depths, self.winners = (Memory(device, samples, 1, "u4") for _ in range(2))
 
-        # software devices copy several times faster than their shaders write; GPUs copy to textures at a hundredth of
-        # their memory's speed
-        self.blank = None if device.is_hardware else device.ctx.buffer(b"\xff" * (4 * MEMORY_WIDTH * BLANK_ROWS))
-
-    def bind(self) -> None:
-        """Bind both to their image units."""
+    def clear(self, job: Job) -> None:
+        """Nothing is seen: all bits set, greater than any depth or number. Then bind both to their image units."""
+        self.depths.fill(job, True)
+        self.winners.fill(job, True)
         self.depths.bind(2)
         self.winners.bind(3)
-
-    def copy_blank(self) -> None:
-        """Set all bits, greater than any depth or number, where that is done by copying (else plane_clear.comp)."""
-        for memory in (self.depths, self.winners):
-            height = memory.texture.height
-            for first in range(0, height, BLANK_ROWS):
-                box = (0, first, MEMORY_WIDTH, min(BLANK_ROWS, height - first))
-                memory.texture.write(self.blank, box)
 
 
 class Corners:

@@ -216,14 +216,8 @@ class Drawing:
     def _clear(self, part: Round) -> None:
         samples = 16 * part.tiles * part.planes
         voxels = self.job.kept.get("plane voxels", samples, lambda: Voxels(self.job.device, samples))
-        voxels.bind()
         with _stage(self.job, "clear"):
-            if voxels.blank is not None:
-                voxels.copy_blank()
-            else:
-                program = self.job.program("plane_clear.comp", version=VERSION)
-                _set(program, count=samples)
-                _run(program, samples)
+            voxels.clear(self.job)
         self.triangles.bind(0)
         self.queue.counters.bind_to_storage_buffer(0)
 

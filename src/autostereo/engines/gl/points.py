@@ -1,17 +1,15 @@
 """Points on the gl engine: surfels into the tiles of views, or all sub-pixels of a panel in a single pass.
 
-Technique. A surfel becomes a quad around what is seen of it, for all cameras at once on panels (Hübner 2007b, section
-3.2); the fragment shader meets its disc with the ray of each sub-pixel (section 3.3.2). Which surfels a sample sees is
-known once the nearest is (ε-z), so they are drawn twice: first the least depth is kept, then the shares of those
-within their own radius of it are summed (the usual 2+1 passes; Botsch and Kobbelt 2003), per channel of a panel, as
-both blendings have a value for each: "min", and "add". A last pass over the picture normalises.
+Technique. A compute shader takes each surfel, once per view or on panels once for all cameras, to the pixels around its
+projections (Hübner 2007b, section 3.2), whose rays meet its disc (section 3.3.2). Which surfels a sample sees is known
+once the nearest is (ε-z), so that is done twice: first the least depth is kept, then the shares of those within their own
+radius of it are summed (the usual 2+1 passes; Botsch and Kobbelt 2003), per channel of a panel. A last pass over the
+picture normalises. Sums are whole numbers, so that no order of surfels changes a bit.
 
-The paper's own 1+1 pass draws once, in K groups that each keep their nearest surfel, and blends the K in the last
-pass; of surfels in one group that overlap it loses all but one. Its reason, that float textures could not be blended
-into, is gone: `single-pass` and `covering-quad` are exact. With `alpha="averaged"` or `"minimal"`, `covering-quad` is
-what the paper has (points_groups.py), for comparison.
+No quads are drawn: for surfels of a few pixels these cost more than their samples, in the vertex stage and in fragments
+that are shaded by blocks. `covering-quad` draws them, as the paper does (points_quads.py).
 
-What is summed lies on a *sheet*: as many tiles, or rows of the panel, as memory shall hold, one after the other.
+What is summed belongs to a *sheet*: as many tiles, or rows of the panel, as memory shall hold, one after the other.
 """
 
 from __future__ import annotations
@@ -25,49 +23,72 @@ from numpy.typing import NDArray
 
 from ...scene.points import Points
 from .atlas import Layout
-from .context import ADD, Device
+from .context import Device
 from .job import Job, Stage
+from .memory import Memory
 from .panel import Panel, write_only
-from .points_buffers import CONSTANTS, SurfelBuffers, give_draw
-from .points_groups import number_of_groups, sum_groups
+from .points_buffers import CONSTANTS, SurfelBuffers, give_draw, work_groups
+from .points_quads import Quads
 from .programs import Defines
 
-SHEET_PIXELS = 2**22  # of a sheet: with all its sums a third of a gigabyte for panels
-OFFSETS, STOPS, NEAREST, SUMS, WEIGHTS = range(5)  # texture units
-MIN = 0x8007  # GL_MIN
+SHEET_PIXELS = 2**22  # of a sheet: with all its sums a quarter of a gigabyte for panels
+OFFSETS, STOPS = 0, 1  # texture units
+VERSION = 430
 
 
 class Sheet:
-    """Textures that surfels are summed in; `panel`: three values of each kind per pixel, else one view's."""
+    """What is known of a sheet's samples before points: cameras of a panel's sub-pixels, and depths that may hide points.
+
+    Attributes
+    ----------
+    size : (int, int)
+    panel : bool
+        Three samples a pixel, else one.
+    offsets, stops : moderngl.Texture, optional
+        Camera offsets of sub-pixels; depths of what is opaque.
+    depth : moderngl.Texture, optional
+        Depth buffer: the farthest that points may lie at, for each pixel.
+    """
 
     def __init__(self, device: Device, size: tuple[int, int], panel: bool, stopped: bool) -> None:
         ctx = device.ctx
-        self.size, self.panel, self.stopped = size, panel, stopped
-
-        def texture(components: int) -> Any:
-            made = ctx.texture(size, components, dtype="f4")
-            made.filter = (ctx.NEAREST, ctx.NEAREST)
-            return made
-
+        self.size, self.panel = size, panel
         each = 4 if panel else 1
-        depth = ctx.depth_texture(size) if stopped else None
-        self.nearest, self.sums = texture(each), texture(4)
-        self.weights = texture(4) if panel else None
-        self.offsets = texture(4) if panel else None
-        self.stops = texture(each) if stopped else None
-        self.nearest_target = ctx.framebuffer([self.nearest], depth)
-        self.sums_target = ctx.framebuffer([self.sums, self.weights] if panel else [self.sums], depth)
+        self.offsets = ctx.texture(size, each, dtype="f4") if panel else None
+        self.stops = ctx.texture(size, each, dtype="f4") if stopped else None
+        self.depth = ctx.depth_texture(size) if stopped else None
+        for texture in (self.offsets, self.stops):
+            if texture is not None:
+                texture.filter = (ctx.NEAREST, ctx.NEAREST)
         self.offsets_target: Any = ctx.framebuffer([self.offsets]) if panel else None
-        self.all_target: Any = ctx.framebuffer([self.nearest, self.sums, self.weights]) if panel else None
-        self.stops_target: Any = ctx.framebuffer([self.stops], depth) if stopped else None
+        self.stops_target: Any = ctx.framebuffer([self.stops], self.depth) if stopped else None
 
     def give(self, program: Any) -> None:
         """Bind the textures that a program reads."""
-        units = {"offsets": OFFSETS, "stops": STOPS, "nearest": NEAREST, "sums": SUMS, "weights": WEIGHTS}
-        for name, unit in units.items():
+        for name, texture, unit in (("offsets", self.offsets, OFFSETS), ("stops", self.stops, STOPS)):
             if name in program:
-                getattr(self, name).use(unit)
+                assert texture is not None
+                texture.use(unit)
                 program[name] = unit
+
+
+class Sums:
+    """Least depth of each sample, and sums of what it sees (lib/sums.glsl)."""
+
+    def __init__(self, device: Device, samples: int, values: int) -> None:
+        self.nearest = Memory(device, samples, 1, "u4")
+        self.words = [Memory(device, values * samples, 1, "u4") for _ in range(2)]
+
+    def clear(self, job: Job) -> None:
+        """Nothing is seen."""
+        self.nearest.fill(job, True)
+        for memory in self.words:
+            memory.fill(job, False)
+
+    def bind(self) -> None:
+        """To the image units of lib/sums.glsl."""
+        for unit, memory in enumerate([self.nearest, *self.words], 1):
+            memory.bind(unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +115,7 @@ class PointClouds(Stage):
 
     def __init__(self, device: Device, clouds: Sequence[Points], middle: NDArray[np.float64]) -> None:
         self._buffers = SurfelBuffers(device, clouds, middle)
+        self._quads = Quads(device, self._buffers)
 
     def draws_over(self, job: Job) -> bool:
         """On panels a single pass needs no views."""
@@ -102,22 +124,20 @@ class PointClouds(Stage):
     def draw_views(self, job: Job, tiles: range) -> None:
         """Draw the views of these tiles, as many at a time as a sheet holds."""
         self._buffers.make_ready(job)
-        stopped = job.draw.method == "n-pass-masked" or has_others(job)
         size = job.atlas.layout.width, job.atlas.layout.height
         most = max(1, min(len(tiles), SHEET_PIXELS // (size[0] * size[1])))
         layout = Layout.fitting(most, size, job.device.limits)
+        stopped = job.draw.method == "n-pass-masked" or has_others(job)
         sheet = self._sheet(job, layout.size, False, stopped)
         for first in range(tiles.start, tiles.stop, layout.count):
             count = min(layout.count, tiles.stop - first)
             part = Part(sheet, (*layout.size, layout.columns, 0.0), first, count)
             if stopped:
                 self._stop(job, part, job.atlas.depth)
-            self._sum(job, part)
+            self._splat(job, part)
             program = job.masked_program if job.mask is not None else job.program
-            resolve = program("tile.vert", "points_resolve.frag", defines=CONSTANTS)
+            resolve = program("tile.vert", "points_resolve.frag", defines=CONSTANTS, version=VERSION)
             resolve["first_view"] = first
-            sheet.give(resolve)
-            resolve["sheet"] = part.place
             job.atlas.target.use()
             job.device.ctx.enable_only(job.device.ctx.DEPTH_TEST)
             job.vertex_array(resolve, []).render(job.device.ctx.TRIANGLE_STRIP, vertices=4, instances=count)
@@ -126,8 +146,8 @@ class PointClouds(Stage):
         """Draw all sub-pixels of a panel, band after band."""
         self._buffers.make_ready(job)
         width, height = panel.size
-        groups = number_of_groups(job, self._buffers)
-        rows = max(1, min(height, SHEET_PIXELS // (width * max(groups, 1))))
+        quads = job.draw.method == "covering-quad"
+        rows = max(1, min(height, SHEET_PIXELS // (width * max(self._quads.groups(job), 1))))
         stopped = has_others(job)
         sheet = self._sheet(job, (width, rows), True, stopped)
         for first in range(0, height, rows):
@@ -135,11 +155,11 @@ class PointClouds(Stage):
             self._find_offsets(job, part)
             if stopped:
                 self._stop(job, part, panel.depth)
-            if groups:
-                sum_groups(job, self._buffers, sheet, part.place, groups)
+            if quads:
+                self._quads.draw(job, part)
             else:
-                self._sum(job, part)
-            self._put(job, part, panel)
+                self._splat(job, part)
+            self._put(job, part, panel, quads)
 
     def _sheet(self, job: Job, size: tuple[int, int], panel: bool, stopped: bool) -> Sheet:
         key = size, stopped
@@ -172,37 +192,37 @@ class PointClouds(Stage):
         job.cover(program)
         ctx.depth_func = "<"
 
-    def _sum(self, job: Job, part: Part) -> None:
+    def _splat(self, job: Job, part: Part) -> None:
         """Find the nearest of all surfels, then sum up those that are seen."""
         ctx, sheet = job.device.ctx, part.sheet
-        ctx.enable_only(ctx.BLEND | ctx.DEPTH_TEST if sheet.stopped else ctx.BLEND)
-        ctx.blend_func = ctx.ONE, ctx.ONE
+        samples, values = (3 * sheet.size[0] * sheet.size[1], 2) if sheet.panel else (sheet.size[0] * sheet.size[1], 4)
+        sums = job.kept.get(("sums", sheet.panel), samples, lambda: Sums(job.device, samples, values))
+        sums.clear(job)
+        self._buffers.ready.bind(0)
+        sums.bind()
+        if sheet.offsets is not None:
+            sheet.offsets.bind_to_image(4, write=False)
         for nearest in (True, False):
-            target = sheet.nearest_target if nearest else sheet.sums_target
-            target.depth_mask = False
-            target.use()
-            clear(target, CONSTANTS["FAR"] if nearest else 0.0)
-            ctx.blend_equation = MIN if nearest else ADD
-            self._draw_quads(job, part, {"NEAREST": nearest})
-        ctx.blend_equation = ADD
+            ctx.memory_barrier()
+            defines: Defines = {
+                **self._buffers.switches(job), "PANEL": sheet.panel, "STOPPED": sheet.stops is not None, "NEAREST": nearest
+            }
+            program = job.program("points_splat.comp", defines=defines, version=VERSION)
+            sheet.give(program)
+            give_draw(program, job, part.place)
+            program["count"] = self._buffers.count
+            if "first_view" in program:
+                program["first_view"] = part.first
+            program.run(*work_groups(self._buffers.count), part.count)
+        ctx.memory_barrier()
 
-    def _draw_quads(self, job: Job, part: Part, defines: Defines) -> None:
-        sheet = part.sheet
-        defines = {**defines, **self._buffers.switches(job), "PANEL": sheet.panel, "STOPPED": sheet.stopped}
-        program = job.program("points.vert", "points.frag", defines=defines, version=430)
-        sheet.give(program)
-        give_draw(program, job, part.place)
-        if "first_view" in program:
-            program["first_view"] = part.first
-        quads = job.vertex_array(program, [], self._buffers.quads)
-        quads.render(vertices=6 * self._buffers.count, instances=part.count)
-
-    def _put(self, job: Job, part: Part, panel: Panel) -> None:
+    def _put(self, job: Job, part: Part, panel: Panel, quads: bool) -> None:
         """Normalise a band into the panel's colours and depths, a channel at a time: they may be seen apart."""
         ctx = job.device.ctx
-        defines = {**CONSTANTS, "PANEL": True}
-        program = job.masked_program("screen.vert", "points_resolve.frag", defines=defines)
-        part.sheet.give(program)
+        defines = {**CONSTANTS, "PANEL": True, "QUADS": quads}
+        program = job.masked_program("screen.vert", "points_resolve.frag", defines=defines, version=VERSION)
+        if quads:
+            self._quads.give(job, part, program)
         program["sheet"] = part.place
         ctx.enable_only(ctx.NOTHING)
         for channel in range(3):
@@ -216,8 +236,3 @@ class PointClouds(Stage):
 def has_others(job: Job) -> bool:
     """Whether something else in the scene may hide points."""
     return any(not isinstance(item, Points) for item in job.scene.objects)
-
-
-def clear(target: Any, value: float) -> None:
-    """Fill the colours of a framebuffer, not its depth."""
-    target.clear(value, value, value, value)

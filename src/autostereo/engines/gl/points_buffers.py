@@ -10,17 +10,20 @@ from numpy.typing import NDArray
 
 from ...errors import UnsupportedError
 from ...scene.points import Points
+from ..constants import MEMORY_WIDTH
 from ..reference.points import LEAST_RADIUS, Surfels
 from ..reference.shading import lights_in_eye_space
 from .context import Device
 from .job import Job
+from .memory import Memory
 from .programs import Defines
 
 FLOATS = 12  # of a surfel as it is sent; see shaders/points_setup.comp
-RECORD = 7 * 16  # bytes of one that is ready; see shaders/lib/surfels.glsl
+RECORD = 7  # texels of one that is ready; see shaders/lib/surfels.glsl
 GROUP = 64  # invocations of a work group
 MOST_GROUPS = 65535  # in a row: what OpenGL promises
-POINTS, SURFELS, MATERIALS = 0, 1, 2  # bindings
+POINTS, MATERIALS = 0, 2  # bindings
+RECORDS = 5  # texture unit
 CONSTANTS: Defines = {
     "LEAST_RADIUS": LEAST_RADIUS,
     "FAR": 1e30,  # depth of nothing
@@ -35,8 +38,8 @@ class SurfelBuffers:
     Attributes
     ----------
     count : int
-    quads : moderngl.Buffer
-        Indices of two triangles for each four vertices.
+    ready : Memory
+        A record of each surfel (shaders/lib/surfels.glsl), once `make_ready` has been called.
     """
 
     def __init__(self, device: Device, clouds: Sequence[Points], middle: NDArray[np.float64]) -> None:
@@ -44,10 +47,10 @@ class SurfelBuffers:
         points = np.concatenate(parts).astype(np.float32)
         points = points[space_filling_order(points[:, :3])]
         self.count = len(points)
-        most = min(device.limits.buffer, device.limits.storage) // RECORD
+        most = MEMORY_WIDTH * device.limits.texture // RECORD
         if self.count > most:
             raise UnsupportedError(
-                f"{self.count} points are more than a buffer of this device holds, {most} ({device.renderer}): "
+                f"{self.count} points are more than a texture of this device holds, {most} ({device.renderer}): "
                 "choose fewer, or engine='cpu'"
             )
         materials = [cloud.material for cloud in clouds]
@@ -55,9 +58,7 @@ class SurfelBuffers:
         self._points = device.upload(points)
         numbers = [(m.ambient, m.diffuse, m.specular, m.shininess) for m in materials]
         self._materials = device.upload(np.array(numbers, dtype=np.float32))
-        self._ready = device.ctx.buffer(reserve=self.count * RECORD)
-        first = 4 * np.arange(self.count, dtype=np.uint32)[:, None]
-        self.quads = device.ctx.buffer((first + np.array([0, 1, 2, 2, 1, 3], np.uint32)).tobytes())
+        self.ready = Memory(device, RECORD * self.count, 4, "f4")
 
     def switches(self, job: Job) -> Defines:
         """The switches of lib/surfels.glsl and lib/shading.glsl."""
@@ -68,25 +69,28 @@ class SurfelBuffers:
     def make_ready(self, job: Job) -> None:
         """Place and light the surfels for a draw, unless they are ready; the block Frame has to be written."""
         job.kept.get("surfels", (self, job.draw), lambda: self._run_setup(job))
-        self._ready.bind_to_storage_buffer(SURFELS)
 
     def _run_setup(self, job: Job) -> bool:
         program = job.program("points_setup.comp", defines=self.switches(job), version=430)
         self._points.bind_to_storage_buffer(POINTS)
-        self._ready.bind_to_storage_buffer(SURFELS)
+        self.ready.bind(0)
         self._materials.bind_to_storage_buffer(MATERIALS)
-        groups = -(-self.count // GROUP)
-        columns = min(groups, MOST_GROUPS)
-        program["count"], program["row_of_groups"] = self.count, columns * GROUP
+        program["count"] = self.count
         program["reach"] = job.draw.culling
         set_lights(program, job)
-        program.run(columns, -(-groups // columns))
+        program.run(*work_groups(self.count))
         job.device.ctx.memory_barrier()
         return True
 
 
+def work_groups(invocations: int) -> tuple[int, int]:
+    """Work groups in x and y for so many invocations (lib/invocation.glsl)."""
+    groups = -(-invocations // GROUP)
+    return min(groups, MOST_GROUPS), -(-groups // MOST_GROUPS)
+
+
 def give_draw(program: Any, job: Job, place: tuple[float, ...]) -> None:
-    """Give a program of points.vert where it draws, `place` as points.Part has it, and what shaders need to know."""
+    """Give a program where it draws, `place` as points.Part has it, and what shaders need to know."""
     columns = job.columns or (0.5, 0.5, 0.5)
     given = {
         "sheet": place, "sample_range": (min(columns), max(columns), job.row, job.row), "reach": job.draw.culling,

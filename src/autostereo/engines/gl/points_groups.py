@@ -8,16 +8,20 @@ Where they are, all but one are lost: the picture is that of `single-pass` only 
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...errors import UnsupportedError
 from .atlas import Layout
 from .context import Device
 from .job import Job
-from .points_buffers import CONSTANTS, SurfelBuffers, give_draw
+from .points_buffers import CONSTANTS, SurfelBuffers
 from .programs import Defines
 
-SHARES, EPSILONS, KEPT = 5, 6, 7  # texture units, after those of points_sheet
+if TYPE_CHECKING:
+    from .points import Part
+    from .points_quads import Quads
+
+SHARES, EPSILONS, KEPT = 6, 7, 8  # texture units, after those of points.py, points_quads.py and points_buffers.py
 
 
 class Groups:
@@ -57,31 +61,26 @@ def groups_layout(job: Job, count: int, size: tuple[int, int]) -> Layout:
     return layout
 
 
-def sum_groups(job: Job, buffers: SurfelBuffers, sheet: Any, place: tuple[float, ...], count: int) -> None:
-    """Fill a panel's sheet with what `count` groups show; `place` as points.Part has it."""
+def sum_groups(job: Job, quads: Quads, part: Part, target: Any, count: int) -> None:
+    """Fill what a band is blended into, `target`, with what `count` groups show."""
     ctx = job.device.ctx
-    layout = groups_layout(job, count, sheet.size)
+    layout = groups_layout(job, count, part.sheet.size)
     groups = job.kept.get("groups", layout, lambda: Groups(job.device, layout))
-    place = (*place[:3], float(layout.columns))
-    switches: Defines = {
-        **buffers.switches(job), "PANEL": True, "STOPPED": sheet.stopped, "GROUPS": count,
-        "LEAST_DEPTH": job.draw.options.alpha == "minimal",
-    }
-    program = job.program("points.vert", "points_groups.frag", defines=switches, version=430)
-    sheet.give(program)
-    give_draw(program, job, place)
+    place = (*part.place[:3], float(layout.columns))
+    defines: Defines = {"GROUPS": count, "LEAST_DEPTH": job.draw.options.alpha == "minimal"}
+    program = quads.program(job, part, "points_groups.frag", place, defines)
     groups.target.color_mask = ((False,) * 4,) * 2  # whole numbers cannot be cleared; `kept` says what is there
     groups.target.use()
     groups.target.clear()
     groups.target.color_mask = ((True,) * 4,) * 2
     ctx.enable_only(ctx.DEPTH_TEST)
-    job.vertex_array(program, [], buffers.quads).render(vertices=6 * buffers.count)
+    quads.render(job, program)
 
     program = job.program("screen.vert", "points_blend.frag", defines={**CONSTANTS, "GROUPS": count}, version=430)
     for name, unit in (("shares", SHARES), ("epsilons", EPSILONS), ("kept", KEPT)):
         getattr(groups, name).use(unit)
         program[name] = unit
     program["sheet"] = place
-    sheet.all_target.use()
+    target.use()
     ctx.enable_only(ctx.NOTHING)
     job.cover(program)

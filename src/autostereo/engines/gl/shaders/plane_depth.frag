@@ -2,6 +2,7 @@
 #define DEPTHS
 #include "lib/frame.glsl"
 #include "lib/views.glsl"
+#include "lib/memory.glsl"
 #include "lib/plane_memory.glsl"
 
 uniform ivec2 picture;    // width; rows of this round

@@ -18,6 +18,7 @@
 #include "lib/texture.glsl"
 #endif
 #include "lib/surface.glsl"
+#include "lib/memory.glsl"
 #include "lib/plane_memory.glsl"
 #include "lib/plane_surface.glsl"
 

@@ -9,6 +9,7 @@
 #define BLOCKS
 #endif
 #include "lib/frame.glsl"
+#include "lib/memory.glsl"
 #include "lib/plane_memory.glsl"
 #include "lib/plane_triangle.glsl"
 #include "lib/plane_pass.glsl"

@@ -2,6 +2,7 @@
 #define TRIANGLES
 #define POINTS
 #include "lib/frame.glsl"
+#include "lib/memory.glsl"
 #include "lib/plane_memory.glsl"
 #include "lib/plane_triangle.glsl"
 #include "lib/plane_pass.glsl"

@@ -2,6 +2,7 @@
 #define SHOWN
 #define CAMERA_OFFSET
 #include "lib/frame.glsl"
+#include "lib/memory.glsl"
 #include "lib/plane_memory.glsl"
 #include "lib/viewmap.glsl"
 #include "lib/cameras.glsl"

@@ -14,6 +14,7 @@
 #endif
 #define BLOCKS
 #include "lib/frame.glsl"
+#include "lib/memory.glsl"
 #include "lib/plane_memory.glsl"
 #include "lib/plane_triangle.glsl"
 #include "lib/plane_pass.glsl"

@@ -3,6 +3,7 @@
 #include "lib/frame.glsl"
 #include "lib/shading.glsl"
 #include "lib/surface.glsl"
+#include "lib/memory.glsl"
 #include "lib/plane_memory.glsl"
 #include "lib/plane_surface.glsl"
 #include "lib/invocation.glsl"

@@ -3,9 +3,12 @@
 // LEAST_DEPTH: the least of the three, else their mean.
 #include "lib/frame.glsl"
 #include "lib/shading.glsl"
+#include "lib/memory.glsl"
+#define RECORD_TEXTURE
 #include "lib/surfels.glsl"
 #include "lib/discs.glsl"
 
+uniform sampler2D offsets;
 #ifdef STOPPED
 uniform sampler2D stops;
 #endif
@@ -15,9 +18,9 @@ layout(location = 1) out float epsilon;
 
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy) % ivec2(sheet.xy);
-    vec3 dx, depth;
+    vec3 v = texelFetch(offsets, at, 0).rgb, dx, depth;
     float dy;
-    vec3 v = rays_of(at, dx, dy);
+    rays_of(at, v, dx, dy);
     vec3 weight = meet(v, dx, dy, depth), margin = weight;
 #ifdef STOPPED
     margin = min(margin, texelFetch(stops, at, 0).rgb - depth);

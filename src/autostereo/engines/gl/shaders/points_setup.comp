@@ -2,16 +2,16 @@
 // As engines/cpu/points_setup.py.
 #include "lib/frame.glsl"
 #include "lib/shading.glsl"
+#include "lib/memory.glsl"
 #include "lib/surfels.glsl"
+#include "lib/invocation.glsl"
 
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Points { float points[]; };  // 12 each: position, radius, normal, material, colour
-layout(std430, binding = 1) writeonly buffer Surfels { Surfel surfels[]; };
 layout(std430, binding = 2) readonly buffer Materials { vec4 materials[]; };  // ambient, diffuse, specular, shininess
 
-uniform int count;
-uniform int row_of_groups;  // invocations in a row of work groups
+uniform uint count;
 uniform vec2 reach;         // least and greatest camera offset
 
 const float LARGEST = 1e5, SMALLEST = 1e-10;  // radius over depth: what is seen of larger discs is seen of these
@@ -36,11 +36,18 @@ vec2 extent(float p, float n, float nd, float size) {
     return vec2(middle - root, middle + root) / lead;
 }
 
+void store(int number, vec4 texels[RECORD]) {
+    for (int k = 0; k < RECORD; ++k) {
+        imageStore(surfels, place_of(uint(RECORD * number + k)), texels[k]);
+    }
+}
+
 void main() {
-    int number = int(gl_GlobalInvocationID.x) + row_of_groups * int(gl_GlobalInvocationID.y);
-    if (number >= count) {
+    uint k = invocation();
+    if (k >= count) {
         return;
     }
+    int number = int(k);
     int at = 12 * number;
     vec3 p = (eye_from_local * vec4(points[at], points[at + 1], points[at + 2], 1.0)).xyz;
     vec3 n = mat3(eye_from_local) * vec3(points[at + 4], points[at + 5], points[at + 6]);
@@ -52,17 +59,17 @@ void main() {
         n = -n;
     }
 
-    Surfel s;
-    s.box = vec4(1.0, -1.0, 1.0, -1.0);  // nothing is seen
+    vec4 s[RECORD];
+    s[BOX] = vec4(1.0, -1.0, 1.0, -1.0);  // nothing is seen
     if (!(p.z >= depth_range.z)) {
-        s.place = vec4(0.0, 0.0, 1.0, 1.0);
-        s.normal = s.shape = s.area = s.color = s.back = vec4(0.0);
-        surfels[number] = s;
+        s[PLACE] = vec4(0.0, 0.0, 1.0, 1.0);
+        s[NORMAL] = s[SHAPE] = s[AREA] = s[COLOR] = s[BACK] = vec4(0.0);
+        store(number, s);
         return;
     }
     float size = clamp(points[at + 3] / p.z, SMALLEST, LARGEST);
-    s.place = vec4(p, size * p.z);
-    s.normal = vec4(n, 0.0);
+    s[PLACE] = vec4(p, size * p.z);
+    s[NORMAL] = vec4(n, 0.0);
 
     // the ellipse that it projects to, for eyes between the ends of the camera line
     vec2 r = size * lens.xy, a = (p.x - reach.yx) / p.z;
@@ -79,8 +86,8 @@ void main() {
         float slack = 1e-4 * (1.0 + dot(abs(squares), vec3(1.0, abs(a.x) + abs(a.y), a.x * a.x + a.y * a.y)));
         thin = least_of(squares, a) < 0.5 + slack || least_of(lesser, a) + 0.0625 < slack;
     }
-    s.shape = vec4(squares, 1.0 / (s.place.w * s.place.w));
-    s.area = vec4(area, material.zw);
+    s[SHAPE] = vec4(squares, 1.0 / (s[PLACE].w * s[PLACE].w));
+    s[AREA] = vec4(area, material.zw);
 
     vec2 upright = max(r, LEAST_RADIUS);
     vec4 box = vec4(-upright.x, upright.x, -upright.y, upright.y);
@@ -90,15 +97,15 @@ void main() {
         box = thin ? vec4(min(seen.xz, box.xz), max(seen.yw, box.yw)).xzyw : seen;
     }
     vec2 pad = 0.02 + 1e-4 * (box.yw - box.xz);
-    s.box = box + vec4(-pad.x, pad.x, -pad.y, pad.y);
+    s[BOX] = box + vec4(-pad.x, pad.x, -pad.y, pad.y);
 
     vec3 reflected, highlight, own = vec3(points[at + 8], points[at + 9], points[at + 10]);
     illuminate(p, -n, vec3(0.0, lens.w, 0.0), material, reflected, highlight);
-    s.back = vec4(own * reflected, 0.0);
+    s[BACK] = vec4(own * reflected, 0.0);
     illuminate(p, n, vec3(0.0, lens.w, 0.0), material, reflected, highlight);
-    s.color = vec4(own * reflected, 0.0);
+    s[COLOR] = vec4(own * reflected, 0.0);
 #ifndef OWN_EYE
-    s.color.rgb += highlight;
+    s[COLOR].rgb += highlight;
 #endif
-    surfels[number] = s;
+    store(number, s);
 }

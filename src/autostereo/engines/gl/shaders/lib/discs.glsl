@@ -1,12 +1,15 @@
 // Where rays meet surfels: lib/surfels.glsl says how. Needs frame.glsl and surfels.glsl; for fragment shaders.
 
-flat in vec4 place;
-flat in vec4 normal;
-flat in vec4 shape;
-flat in vec4 area;
-flat in vec3 color;
-#if defined(PANEL) && defined(SIDES)
-flat in vec3 back;
+#ifndef GIVEN
+#define GIVEN flat in
+#endif
+GIVEN vec4 place;
+GIVEN vec4 normal;
+GIVEN vec4 shape;
+GIVEN vec4 area;
+GIVEN vec3 color;
+#ifdef SIDES
+GIVEN vec3 back;
 #endif
 
 // The depth at which rays from camera offsets v meet the disc; a ray gains (dx, dy, 1) per unit of depth. Returns its
@@ -33,8 +36,8 @@ real meet(real v, real dx, float dy, out real depth) {
 // The light that eyes at camera offsets v get from the disc: for a panel, each channel by its own eye.
 vec3 light_for(real v) {
     vec3 light = color;
-#if defined(PANEL) && defined(SIDES)
-    vec3 side = side_seen(v, place.xyz, normal.xyz);
+#ifdef SIDES
+    real side = side_seen(v, place.xyz, normal.xyz);
     light = chosen(back, color, side);
 #ifdef OWN_EYE
     light += highlights(v, side, place.xyz, normal.xyz, area.zw);
@@ -47,14 +50,11 @@ vec3 light_for(real v) {
 uniform vec3 columns;       // where pixels are sampled
 uniform float row;
 uniform vec4 sheet;         // size of the band; its first row; columns of groups
-uniform sampler2D offsets;  // of the cameras of sub-pixels
 
-// Camera offsets of a pixel of the band, and the rays of its sub-pixels.
-vec3 rays_of(ivec2 at, out vec3 dx, out float dy) {
-    vec3 v = texelFetch(offsets, at, 0).rgb;
+// The rays of the sub-pixels of a pixel of the band, from their cameras at offsets v.
+void rays_of(ivec2 at, vec3 v, out vec3 dx, out float dy) {
     vec2 pixel = vec2(at) + vec2(0.0, sheet.z);
     dx = (pixel.x + columns - window.z) / lens.x - v * depth_range.w;
     dy = -(pixel.y + row - window.w) / lens.y - lens.w * depth_range.w;
-    return v;
 }
 #endif

@@ -1,5 +1,4 @@
-// The plane rasteriser's arrays. They are pictures of MEMORY_WIDTH columns, element i at place_of(i): software devices
-// read these several times faster than storage buffers. Made by plane_buffers.py.
+// The plane rasteriser's arrays, element i at place_of(i) (memory.glsl). Made by plane_buffers.py.
 //
 // Switches: those that a stage uses, as devices may have eight images a stage and no more.
 
@@ -28,10 +27,6 @@ layout(rgba32f, binding = 6) uniform image2D points;       // vertices in eye sp
 #ifdef BLOCKS
 layout(rgba32f, binding = 7) uniform image2D blocks;       // row b: offsets of its views; least and greatest
 #endif
-
-ivec2 place_of(uint i) {
-    return ivec2(i % MEMORY_WIDTH, i / MEMORY_WIDTH);
-}
 
 // Number of a sample in a round: the 16 pixels of a tile lie together, and a tile's planes (views, or channels of a panel).
 uint sample_number(ivec2 pixel, int plane, int width, int plane_count) {

@@ -1,4 +1,4 @@
-// Surfels, made ready for all views by points_setup.comp. Needs frame.glsl and shading.glsl.
+// Surfels, made ready for all views by points_setup.comp. Needs frame.glsl, shading.glsl and memory.glsl.
 //
 // The plane n.(X - P) = 0 of a disc is met at depth n.(P - eye)/n.ray (Huebner 2007b, equation 2), where it weighs
 // 1 - |X - P|^2/r^2. Where it appears less than a pixel wide, or has no normal, it stands upright, as an ellipse: a plane of
@@ -17,15 +17,27 @@
 #define chosen(no, yes, which) ((which) > 0.0 ? (yes) : (no))
 #endif
 
-struct Surfel {
-    vec4 place;   // P in eye space; radius
-    vec4 normal;  // unit, turned to the centre camera, (0, 0, -1) if it has none; unused
-    vec4 shape;   // S(a) = x + a (y + a z); 1/r^2
-    vec4 area;    // A(a) = x + a y; specular, shininess
-    vec4 color;   // lit on the side that the normal points to, without what only a view's own eye sees; unused
-    vec4 back;    // on the other side
-    vec4 box;     // left, right, top, bottom of what any view sees of it, in pixels from its centre
-};
+// Texels of a surfel's record.
+const int PLACE = 0;   // P in eye space; radius
+const int NORMAL = 1;  // unit, turned to the centre camera, (0, 0, -1) if it has none; unused
+const int SHAPE = 2;   // S(a) = x + a (y + a z); 1/r^2
+const int AREA = 3;    // A(a) = x + a y; specular, shininess
+const int COLOR = 4;   // lit on the side that the normal points to, without what only a view's own eye sees; unused
+const int BACK = 5;    // on the other side
+const int BOX = 6;     // left, right, top, bottom of what any view sees of it, in pixels from its centre
+const int RECORD = 7;
+
+#ifdef RECORD_TEXTURE
+uniform sampler2D surfels;
+#define record_texel(at) texelFetch(surfels, at, 0)
+#else
+layout(rgba32f, binding = 0) uniform image2D surfels;
+#define record_texel(at) imageLoad(surfels, at)
+#endif
+
+vec4 record(int number, int texel) {
+    return record_texel(place_of(uint(RECORD * number + texel)));
+}
 
 #ifdef SIDES
 // 1 where the eyes at camera offsets v look at the side that the normal points to, else -1.
