@@ -28,6 +28,7 @@ from .job import Job, Stage
 from .memory import Memory
 from .panel import Panel, write_only
 from .points_buffers import CONSTANTS, SurfelBuffers, give_draw, work_groups
+from .points_lattice import Lattice, find_lattice
 from .points_quads import Quads
 from .programs import Defines
 
@@ -200,21 +201,44 @@ class PointClouds(Stage):
         sums.clear(job)
         self._buffers.ready.bind(0)
         sums.bind()
-        if sheet.offsets is not None:
-            sheet.offsets.bind_to_image(4, write=False)
+        lattice = self._lattice(job, sheet)
         for nearest in (True, False):
             ctx.memory_barrier()
             defines: Defines = {
-                **self._buffers.switches(job), "PANEL": sheet.panel, "STOPPED": sheet.stops is not None, "NEAREST": nearest
+                **self._buffers.switches(job), "PANEL": sheet.panel, "STOPPED": sheet.stops is not None, "NEAREST": nearest,
+                "LATTICE": lattice is not None, "UNITS": lattice.units if lattice else 0,
+                "SLOTS": len(lattice.slots) if lattice else 0,
             }
             program = job.program("points_splat.comp", defines=defines, version=VERSION)
             sheet.give(program)
             give_draw(program, job, part.place)
             program["count"] = self._buffers.count
+            if lattice is not None:
+                program["phase_step"], program["flip"] = lattice.step, (job.draw.flip_x, job.draw.flip_y)
+                program["slots"].write(lattice.slots.tobytes())
             if "first_view" in program:
                 program["first_view"] = part.first
             program.run(*work_groups(self._buffers.count), part.count)
         ctx.memory_barrier()
+
+    def _lattice(self, job: Job, sheet: Sheet) -> Lattice | None:
+        """Where sub-pixels of neighbouring cameras lie on a panel, if on a lattice; binds what the shader reads of it."""
+        if sheet.offsets is None:
+            return None
+        draw, size = job.draw, (job.draw.camera.width, job.draw.camera.height)
+        assert draw.viewmap is not None
+        viewmap = draw.viewmap
+
+        def make() -> tuple[Lattice | None, Any]:
+            lattice = find_lattice(viewmap, size, draw.offsets)
+            return lattice, lattice and job.device.ctx.texture((size[1], 1), 1, lattice.starts.tobytes(), dtype="f4")
+
+        lattice, starts = job.kept.get("lattice", (viewmap, size, draw.offsets.tobytes()), make)
+        sheet.offsets.bind_to_image(4, write=False)
+        if lattice is not None:
+            starts.bind_to_image(5, write=False)
+        found: Lattice | None = lattice
+        return found
 
     def _put(self, job: Job, part: Part, panel: Panel, quads: bool) -> None:
         """Normalise a band into the panel's colours and depths, a channel at a time: they may be seen apart."""

@@ -100,7 +100,7 @@ class Quads:
     def program(self, job: Job, part: Part, fragments: str, place: tuple[float, ...], defines: Defines) -> Any:
         """The program that draws quads with these fragments, told all but where the fragments read."""
         stopped = part.sheet.stops is not None
-        switches: Defines = {**self.surfels.switches(job), "PANEL": True, "STOPPED": stopped, **defines}
+        switches: Defines = {**self.surfels.switches(job), "THREE_RAYS": True, "STOPPED": stopped, **defines}
         program = job.program("points.vert", fragments, defines=switches, version=430)
         part.sheet.give(program)
         self.surfels.ready.texture.use(RECORDS)

@@ -18,13 +18,19 @@ uniform uint count;
 #ifdef PANEL
 layout(rgba32f, binding = 4) readonly uniform image2D camera_offsets;  // of sub-pixels
 uniform vec2 reach;      // least and greatest camera offset
-#define SAMPLES 3u
-#define MINE rgb
+uniform vec4 sheet;
+uniform vec3 columns;
+uniform float row;
+#ifdef LATTICE
+// Sub-pixels (UNITS 3), or pixels (1), whose phase grows by the same step: those of a slot are found without a search.
+layout(r32f, binding = 5) readonly uniform image2D row_starts;  // phase of each row of the panel at its left end
+uniform float phase_step;
+uniform vec4 slots[SLOTS];  // least and greatest camera offset; between which phases
+uniform bvec2 flip;
+#endif
 #else
 uniform vec4 sheet;      // size; columns of tiles
 uniform int first_view;  // of the atlas's
-#define SAMPLES 1u
-#define MINE r
 #endif
 #ifdef STOPPED
 uniform sampler2D stops; // depths of what is opaque
@@ -40,68 +46,79 @@ void add(uint k, float value) {
 }
 #endif
 
-// Samples from number `first` on, of one pixel, that look along these rays; stop: depths of what is opaque there.
-void splat(uint first, real v, real dx, float dy, real stop) {
-    real depth, weight = meet(v, dx, dy, depth), margin = min(weight, stop - depth);
+// The sample that looks along this ray; channel: of a panel's, that which it shows; stop: depth of what is opaque there.
+void splat(uint sample_number, int channel, float v, float dx, float dy, float stop) {
+    float depth, weight = meet(v, dx, dy, depth), margin = min(weight, stop - depth);
 #ifndef NEAREST
-#ifdef PANEL
-    for (int c = 0; c < 3; ++c) {
-        float least = uintBitsToFloat(imageLoad(nearest, place_of(first + uint(c))).x);
-        margin[c] = min(margin[c], least * (1.0 + ROUNDING) + place.w - depth[c]);
-    }
-#else
-    margin = min(margin, uintBitsToFloat(imageLoad(nearest, place_of(first)).x) * (1.0 + ROUNDING) + place.w - depth);
+    float least = uintBitsToFloat(imageLoad(nearest, place_of(sample_number)).x);
+    margin = min(margin, least * (1.0 + ROUNDING) + place.w - depth);
 #endif
-    vec3 light = light_for(v);
-#endif
-#ifdef PANEL
-    for (int c = 0; c < 3; ++c) {
-        if (margin[c] > 0.0 && depth[c] >= depth_range.z) {
-            uint k = first + uint(c);
-#ifdef NEAREST
-            imageAtomicMin(nearest, place_of(k), floatBitsToUint(depth[c]));
-#else
-            add(VALUES * k, weight[c] * light[c]);
-            add(VALUES * k + 1u, weight[c]);
-#endif
-        }
-    }
-#else
     if (margin > 0.0 && depth >= depth_range.z) {
 #ifdef NEAREST
-        imageAtomicMin(nearest, place_of(first), floatBitsToUint(depth));
+        imageAtomicMin(nearest, place_of(sample_number), floatBitsToUint(depth));
+#else
+        vec3 light = light_for(v);
+        uint k = VALUES * sample_number;
+#ifdef PANEL
+        add(k, weight * light[channel]);
+        add(k + 1u, weight);
 #else
         for (int c = 0; c < 3; ++c) {
-            add(VALUES * first + uint(c), weight * light[c]);
+            add(k + uint(c), weight * light[c]);
         }
-        add(VALUES * first + 3u, weight);
+        add(k + 3u, weight);
+#endif
 #endif
     }
-#endif
 }
 
+#ifdef PANEL
+// Channels `first` to `last` of a pixel, those whose cameras lie between these offsets.
+void splat_pixel(ivec2 pixel, int first, int last, vec2 ends) {
+    ivec2 at = pixel - ivec2(0, int(sheet.z));
+    vec3 v = imageLoad(camera_offsets, at).rgb;
+    float dy = -(float(pixel.y) + row - window.w) / lens.y - lens.w * depth_range.w;
+    for (int c = first; c <= last; ++c) {
+        float camera = c == 0 ? v.x : c == 1 ? v.y : v.z, column = c == 0 ? columns.x : c == 1 ? columns.y : columns.z;
+        if (camera >= ends.x && camera < ends.y) {
+            float dx = (float(pixel.x) + column - window.z) / lens.x - camera * depth_range.w;
+#ifdef STOPPED
+            float stop = texelFetch(stops, at, 0)[c];
+#else
+            float stop = FAR;
+#endif
+            splat(3u * uint(at.y * int(window.x) + at.x) + uint(c), c, camera, dx, dy, stop);
+        }
+    }
+}
+#endif
+
+#ifdef LATTICE
+// The first unit from `unit` on whose phase may lie between these two; start: the row's phase at unit 0.
+float next_unit(float unit, vec2 phases, float start) {
+    float turn = floor(unit * phase_step + start - phases.x);
+    return unit * phase_step + start <= turn + phases.y ? unit : ceil((turn + 1.0 + phases.x - start) / phase_step);
+}
+#endif
+
 void main() {
-    uint k = invocation();
-    if (k >= count) {
+    uint invoked = invocation();
+    if (invoked >= count) {
         return;
     }
-    int number = int(k);
+    int number = int(invoked);
     place = record(number, PLACE);
+    vec4 box = record(number, BOX);
+    vec2 low, high;
 #ifdef PANEL
-    vec2 ends = reach;
     vec4 bounds = vec4(0.0, sheet.z, window.x, min(sheet.z + sheet.y, window.y));
-    ivec2 origin = ivec2(0, -int(sheet.z));
-    uint offset = 0u;
+    find_quad(place.xyz, box, reach, bounds, low, high);
 #else
     int tile = int(gl_WorkGroupID.z), tile_columns = int(sheet.z);
     float v = views[first_view + tile].x;
-    vec2 ends = vec2(v);
     vec4 bounds = vec4(0.0, 0.0, atlas_size.zw);
-    ivec2 origin = ivec2(tile % tile_columns, tile / tile_columns) * ivec2(atlas_size.zw);
-    uint offset = uint(tile) * uint(atlas_size.z) * uint(atlas_size.w);
+    find_quad(place.xyz, box, vec2(v), bounds, low, high);
 #endif
-    vec2 low, high;
-    find_quad(place.xyz, record(number, BOX), ends, bounds, low, high);
     if (low.x >= high.x) {
         return;
     }
@@ -112,27 +129,46 @@ void main() {
 #ifdef SIDES
     back = record(number, BACK).rgb;
 #endif
-    ivec4 box = ivec4(low, high);
-    uint width = uint(bounds.z);
-    for (int y = box.y; y < box.w; ++y) {
-        for (int x = box.x; x < box.z; ++x) {
-            ivec2 at = ivec2(x, y) + origin;
+    int width = int(bounds.z);
 #ifdef PANEL
-            vec3 v = imageLoad(camera_offsets, at).rgb, dx;
-            float dy;
-            rays_of(at, v, dx, dy);
-            uint first = 3u * (uint(at.y) * width + uint(x));
+#ifdef LATTICE
+    for (int k = 0; k < SLOTS; ++k) {
+        vec4 slot = slots[k];
+        vec2 ends = vec2(k == 0 ? -FAR : slot.x, k == SLOTS - 1 ? FAR : slots[k + 1].x);
+        find_quad(place.xyz, box, slot.xy, bounds, low, high);
+        float first = float(UNITS) * (flip.x ? window.x - high.x : low.x), end = float(UNITS) * (flip.x ? window.x - low.x : high.x);
+        for (float y = low.y; y < high.y; y += 1.0) {
+            float start = imageLoad(row_starts, ivec2(flip.y ? window.y - 1.0 - y : y, 0)).x;
+            for (float at = next_unit(first, slot.zw, start); at < end; at = next_unit(at + 1.0, slot.zw, start)) {
+#if UNITS == 3
+                int unit = int(at), x = unit / 3, c = unit - 3 * x;
+                splat_pixel(ivec2(flip.x ? width - 1 - x : x, y), c, c, ends);
 #else
-            vec3 ray = ray_direction(vec2(x, y) + 0.5, v);
-            float dx = ray.x, dy = ray.y;
-            uint first = offset + uint(y) * width + uint(x);
+                splat_pixel(ivec2(flip.x ? width - 1 - int(at) : int(at), y), 0, 2, ends);
 #endif
-#ifdef STOPPED
-            real stop = texelFetch(stops, at, 0).MINE;
-#else
-            real stop = real(FAR);
-#endif
-            splat(first, v, dx, dy, stop);
+            }
         }
     }
+#else
+    for (int y = int(low.y); y < int(high.y); ++y) {
+        for (int x = int(low.x); x < int(high.x); ++x) {
+            splat_pixel(ivec2(x, y), 0, 2, vec2(-FAR, FAR));
+        }
+    }
+#endif
+#else
+    ivec2 origin = ivec2(tile % tile_columns, tile / tile_columns) * ivec2(atlas_size.zw);
+    uint offset = uint(tile * width * int(bounds.w));
+    for (int y = int(low.y); y < int(high.y); ++y) {
+        for (int x = int(low.x); x < int(high.x); ++x) {
+            vec3 ray = ray_direction(vec2(x, y) + 0.5, v);
+#ifdef STOPPED
+            float stop = texelFetch(stops, ivec2(x, y) + origin, 0).r;
+#else
+            float stop = FAR;
+#endif
+            splat(offset + uint(y * width + x), 0, v, ray.x, ray.y, stop);
+        }
+    }
+#endif
 }

@@ -46,7 +46,7 @@ vec3 light_for(real v) {
     return light;
 }
 
-#ifdef PANEL
+#ifdef THREE_RAYS
 uniform vec3 columns;       // where pixels are sampled
 uniform float row;
 uniform vec4 sheet;         // size of the band; its first row; columns of groups

@@ -6,10 +6,10 @@
 // its projection are the roots of t^2 - S(a) t + A(a)^2, S quadratic and A linear in a: the lesser is below 1/4 where
 // the polynomial is negative at 1/4, or both roots are below.
 //
-// Discs have two sides, each lit at P; every eye sees its own. Switches: PANEL: each fragment meets a disc with three
-// rays, one per channel, else with one; SIDES: eyes may see different sides lit; OWN_EYE: their own highlights, too.
+// Discs have two sides, each lit at P; every eye sees its own. Switches: THREE_RAYS: three rays, one per channel of a pixel,
+// meet a disc at a time, else one; SIDES: eyes may see different sides lit; OWN_EYE: their own highlights, too.
 
-#ifdef PANEL
+#ifdef THREE_RAYS
 #define real vec3
 #define chosen(no, yes, which) mix(no, yes, greaterThan(which, vec3(0.0)))
 #else
