@@ -132,21 +132,39 @@ void main() {
     int width = int(bounds.z);
 #ifdef PANEL
 #ifdef LATTICE
-    for (int k = 0; k < SLOTS; ++k) {
-        vec4 slot = slots[k];
-        vec2 ends = vec2(k == 0 ? -FAR : slot.x, k == SLOTS - 1 ? FAR : slots[k + 1].x);
-        find_quad(place.xyz, box, slot.xy, bounds, low, high);
-        float first = float(UNITS) * (flip.x ? window.x - high.x : low.x), end = float(UNITS) * (flip.x ? window.x - low.x : high.x);
-        for (float y = low.y; y < high.y; y += 1.0) {
-            float start = imageLoad(row_starts, ivec2(flip.y ? window.y - 1.0 - y : y, 0)).x;
-            for (float at = next_unit(first, slot.zw, start); at < end; at = next_unit(at + 1.0, slot.zw, start)) {
-#if UNITS == 3
-                int unit = int(at), x = unit / 3, c = unit - 3 * x;
-                splat_pixel(ivec2(flip.x ? width - 1 - x : x, y), c, c, ends);
-#else
-                splat_pixel(ivec2(flip.x ? width - 1 - int(at) : int(at), y), 0, 2, ends);
-#endif
+    // one loop over slots, rows and units: where invocations go together, nested ones would each wait for the longest
+    int k = -1;
+    vec4 slot;
+    vec2 ends, range;
+    float y = 0.0, bottom = 0.0, at = 0.0, end = 0.0, start;
+    while (true) {
+        if (at >= end) {
+            y += 1.0;
+            if (y >= bottom) {
+                if (++k == SLOTS) {
+                    break;
+                }
+                slot = slots[k];
+                ends = vec2(k == 0 ? -FAR : slot.x, k == SLOTS - 1 ? FAR : slots[k + 1].x);
+                find_quad(place.xyz, box, slot.xy, bounds, low, high);
+                range = float(UNITS) * (flip.x ? window.x - vec2(high.x, low.x) : vec2(low.x, high.x));
+                y = low.y;
+                bottom = high.y;
             }
+            if (y < bottom) {
+                start = imageLoad(row_starts, ivec2(flip.y ? window.y - 1.0 - y : y, 0)).x;
+                at = next_unit(range.x, slot.zw, start);
+                end = range.y;
+            }
+        }
+        if (at < end) {
+#if UNITS == 3
+            int unit = int(at), x = unit / 3, c = unit - 3 * x;
+            splat_pixel(ivec2(flip.x ? width - 1 - x : x, y), c, c, ends);
+#else
+            splat_pixel(ivec2(flip.x ? width - 1 - int(at) : int(at), y), 0, 2, ends);
+#endif
+            at = next_unit(at + 1.0, slot.zw, start);
         }
     }
 #else
