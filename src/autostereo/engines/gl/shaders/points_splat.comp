@@ -48,15 +48,15 @@ void add(uint k, float value) {
 
 // The sample that looks along this ray; channel: of a panel's, that which it shows; stop: depth of what is opaque there.
 void splat(uint sample_number, int channel, float v, float dx, float dy, float stop) {
-    float depth, weight = meet(v, dx, dy, depth), margin = min(weight, stop - depth);
-#ifndef NEAREST
-    float least = uintBitsToFloat(imageLoad(nearest, place_of(sample_number)).x);
-    margin = min(margin, least * (1.0 + ROUNDING) + place.w - depth);
-#endif
-    if (margin > 0.0 && depth >= depth_range.z) {
+    float depth, weight = meet(v, dx, dy, depth);
+    if (min(weight, stop - depth) > 0.0 && depth >= depth_range.z) {
 #ifdef NEAREST
         imageAtomicMin(nearest, place_of(sample_number), floatBitsToUint(depth));
 #else
+        float least = uintBitsToFloat(imageLoad(nearest, place_of(sample_number)).x);
+        if (depth >= least * (1.0 + ROUNDING) + place.w) {
+            return;
+        }
         vec3 light = light_for(v);
         uint k = VALUES * sample_number;
 #ifdef PANEL
@@ -73,22 +73,20 @@ void splat(uint sample_number, int channel, float v, float dx, float dy, float s
 }
 
 #ifdef PANEL
-// Channels `first` to `last` of a pixel, those whose cameras lie between these offsets.
-void splat_pixel(ivec2 pixel, int first, int last, vec2 ends) {
+// A channel of a pixel, if its camera lies between these offsets.
+void splat_channel(ivec2 pixel, int c, vec2 ends) {
     ivec2 at = pixel - ivec2(0, int(sheet.z));
     vec3 v = imageLoad(camera_offsets, at).rgb;
-    float dy = -(float(pixel.y) + row - window.w) / lens.y - lens.w * depth_range.w;
-    for (int c = first; c <= last; ++c) {
-        float camera = c == 0 ? v.x : c == 1 ? v.y : v.z, column = c == 0 ? columns.x : c == 1 ? columns.y : columns.z;
-        if (camera >= ends.x && camera < ends.y) {
-            float dx = (float(pixel.x) + column - window.z) / lens.x - camera * depth_range.w;
+    float camera = c == 0 ? v.x : c == 1 ? v.y : v.z, column = c == 0 ? columns.x : c == 1 ? columns.y : columns.z;
+    if (camera >= ends.x && camera < ends.y) {
+        float dx = (float(pixel.x) + column - window.z) / lens.x - camera * depth_range.w;
+        float dy = -(float(pixel.y) + row - window.w) / lens.y - lens.w * depth_range.w;
 #ifdef STOPPED
-            float stop = texelFetch(stops, at, 0)[c];
+        float stop = texelFetch(stops, at, 0)[c];
 #else
-            float stop = FAR;
+        float stop = FAR;
 #endif
-            splat(3u * uint(at.y * int(window.x) + at.x) + uint(c), c, camera, dx, dy, stop);
-        }
+        splat(3u * uint(at.y * int(window.x) + at.x) + uint(c), c, camera, dx, dy, stop);
     }
 }
 #endif
@@ -160,9 +158,11 @@ void main() {
         if (at < end) {
 #if UNITS == 3
             int unit = int(at), x = unit / 3, c = unit - 3 * x;
-            splat_pixel(ivec2(flip.x ? width - 1 - x : x, y), c, c, ends);
+            splat_channel(ivec2(flip.x ? width - 1 - x : x, y), c, ends);
 #else
-            splat_pixel(ivec2(flip.x ? width - 1 - int(at) : int(at), y), 0, 2, ends);
+            for (int c = 0; c < 3; ++c) {
+                splat_channel(ivec2(flip.x ? width - 1 - int(at) : int(at), y), c, ends);
+            }
 #endif
             at = next_unit(at + 1.0, slot.zw, start);
         }
@@ -170,7 +170,9 @@ void main() {
 #else
     for (int y = int(low.y); y < int(high.y); ++y) {
         for (int x = int(low.x); x < int(high.x); ++x) {
-            splat_pixel(ivec2(x, y), 0, 2, vec2(-FAR, FAR));
+            for (int c = 0; c < 3; ++c) {
+                splat_channel(ivec2(x, y), c, vec2(-FAR, FAR));
+            }
         }
     }
 #endif
