@@ -179,16 +179,19 @@ void main() {
 #else
     ivec2 origin = ivec2(tile % tile_columns, tile / tile_columns) * ivec2(atlas_size.zw);
     uint offset = uint(tile * width * int(bounds.w));
-    for (int y = int(low.y); y < int(high.y); ++y) {
-        for (int x = int(low.x); x < int(high.x); ++x) {
-            vec3 ray = ray_direction(vec2(x, y) + 0.5, v);
+    ivec4 range = ivec4(low, high);
+    int x = range.x, y = range.y;
+    while (y < range.w) {  // one loop, as above
+        vec3 ray = ray_direction(vec2(x, y) + 0.5, v);
 #ifdef STOPPED
-            float stop = texelFetch(stops, ivec2(x, y) + origin, 0).r;
+        float stop = texelFetch(stops, ivec2(x, y) + origin, 0).r;
 #else
-            float stop = FAR;
+        float stop = FAR;
 #endif
-            splat(offset + uint(y * width + x), 0, v, ray.x, ray.y, stop);
-        }
+        splat(offset + uint(y * width + x), 0, v, ray.x, ray.y, stop);
+        bool ends = ++x == range.z;
+        x = ends ? range.x : x;
+        y += int(ends);
     }
 #endif
 }
