@@ -17,6 +17,7 @@ import pytest
 import autostereo as aus
 from autostereo.engines.gl import plane_rasterizer, volume
 from autostereo.engines.gl.context import Limits
+from autostereo.engines.gl.points_quads import Blended
 from autostereo.engines.gl.programs import SHADERS, source
 from autostereo.scene.samples import surfel_cloud
 from gl_device import need_device
@@ -145,8 +146,13 @@ def poorer(monkeypatch: pytest.MonkeyPatch, **limits: int) -> None:
 
 def test_a_device_without_buffers_in_vertex_shaders_is_told_so(monkeypatch: pytest.MonkeyPatch) -> None:
     poorer(monkeypatch, vertex_buffers=0)
-    with pytest.raises(aus.UnsupportedError, match=r"points.vert needs \d storage buffers, .* have 0"):
-        aus.render_views(surfel_cloud(500), RIG, (8, 8), engine="gl")
+    with pytest.raises(aus.UnsupportedError, match=r"quad.vert needs \d storage buffers, .* have 0"):
+        aus.render(SQUARE, PANEL, RIG, method="covering-quad", engine="gl")
+    aus.render(surfel_cloud(500), PANEL, RIG, method="covering-quad", engine="gl")
+
+
+def refuse(*_: object) -> None:
+    raise aus.UnsupportedError("refused")
 
 
 def test_an_error_amid_a_drawing_leaves_nothing_behind(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -157,10 +163,9 @@ def test_an_error_amid_a_drawing_leaves_nothing_behind(monkeypatch: pytest.Monke
     with pytest.raises(aus.UnsupportedError, match="geometry shaders of this device"):
         poorer(monkeypatch, geometry_vertices=3)
         draw(method="geometry-shader", options=aus.Options(views_per_pass=2))
-    with pytest.raises(aus.UnsupportedError, match="storage buffers"):
-        poorer(monkeypatch, vertex_buffers=0)
-        aus.render_views(surfel_cloud(500), RIG, (8, 8), engine="gl")
-    poorer(monkeypatch, vertex_buffers=8)
+    with pytest.raises(aus.UnsupportedError, match="refused"):
+        monkeypatch.setattr(Blended, "give", refuse)
+        aus.render(surfel_cloud(500), PANEL, RIG, method="covering-quad", engine="gl")
     np.testing.assert_array_equal(draw(method="covering-quad").pixels, expected)
 
 
@@ -174,10 +179,11 @@ def test_an_object_that_shaders_cannot_read_is_refused(monkeypatch: pytest.Monke
     aus.render(SQUARE, PANEL, RIG, method="instanced", engine="gl")
 
 
-def test_points_that_shaders_cannot_read_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    poorer(monkeypatch, storage=499 * 7 * 16)
-    with pytest.raises(aus.UnsupportedError, match="500 points are more than a buffer of this device holds, 499"):
-        aus.render_views(surfel_cloud(500), RIG, (8, 8), engine="gl")
+@pytest.mark.parametrize(("limits", "points"), [({"storage": 499 * 12 * 4}, 500), ({"texture": 2}, 1171)])
+def test_points_that_shaders_cannot_read_are_refused(monkeypatch, limits, points) -> None:
+    poorer(monkeypatch, **limits)
+    with pytest.raises(aus.UnsupportedError, match=f"{points} points are more than shaders of .* read, {points - 1}"):
+        aus.render_views(surfel_cloud(points), RIG, (8, 8), engine="gl")
 
 
 def test_more_lights_than_a_shader_can_be_told_of_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 import autostereo as aus
 from autostereo.engines.gl import points as gl_points
+from autostereo.engines.gl import points_splat
 from autostereo.engines.gl.points_buffers import FLOATS, space_filling_order
 from autostereo.scene.samples import surfel_cloud
 from gl_device import need_device
@@ -160,6 +161,10 @@ def test_sheets_and_bands_change_nothing(monkeypatch):
         np.testing.assert_array_equal(a, b)
     monkeypatch.setattr(gl_points, "SHEET_PIXELS", 3 * W * H)  # 3 views, then 2
     np.testing.assert_array_equal(views(scene).color, first[0])
+    monkeypatch.setattr(points_splat, "band_rows", lambda device: 5)  # an invocation's, as on GPUs
+    third = views(scene).color, panel(scene, SLANTED), panel(scene, DISPLAYS["continuous, mirrored"])
+    for a, b in zip(first, third, strict=True):
+        np.testing.assert_array_equal(a, b)
 
 
 def test_a_frame_after_the_first_sends_no_scene_data():

@@ -1,13 +1,8 @@
 """Points on the gl engine: surfels into the tiles of views, or all sub-pixels of a panel in a single pass.
 
-Technique. A compute shader takes each surfel, once per view or on panels once for all cameras, to the pixels around its
-projections (Hübner 2007b, section 3.2), whose rays meet its disc (section 3.3.2). Which surfels a sample sees is known
-once the nearest is (ε-z), so that is done twice: first the least depth is kept, then the shares of those within their own
-radius of it are summed (the usual 2+1 passes; Botsch and Kobbelt 2003), per channel of a panel. A last pass over the
-picture normalises. Sums are whole numbers, so that no order of surfels changes a bit.
-
-No quads are drawn: for surfels of a few pixels these cost more than their samples, in the vertex stage and in fragments
-that are shaded by blocks. `covering-quad` draws them, as the paper does (points_quads.py).
+Which surfels a sample sees is known once the nearest is (ε-z): the least depth is found first, then the shares of those
+within their own radius of it are summed (the usual 2+1 passes; Botsch and Kobbelt 2003), per channel of a panel. A last
+pass over the picture normalises. Both by a compute shader (points_splat.py), or by covering quads (points_quads.py).
 
 What is summed belongs to a *sheet*: as many tiles, or rows of the panel, as memory shall hold, one after the other.
 """
@@ -25,20 +20,17 @@ from ...scene.points import Points
 from .atlas import Layout
 from .context import Device
 from .job import Job, Stage
-from .memory import Memory
 from .panel import Panel, write_only
-from .points_buffers import CONSTANTS, SurfelBuffers, give_draw, work_groups
-from .points_lattice import Lattice, find_lattice
+from .points_buffers import CONSTANTS, SurfelBuffers
 from .points_quads import Quads
-from .programs import Defines
+from .points_splat import VERSION, splat
 
 SHEET_PIXELS = 2**22  # of a sheet: with all its sums a quarter of a gigabyte for panels
 OFFSETS, STOPS = 0, 1  # texture units
-VERSION = 430
 
 
 class Sheet:
-    """What is known of a sheet's samples before points: cameras of a panel's sub-pixels, and depths that may hide points.
+    """What is known of samples before points are drawn: cameras of a panel's sub-pixels, depths that may hide points.
 
     Attributes
     ----------
@@ -71,25 +63,6 @@ class Sheet:
                 assert texture is not None
                 texture.use(unit)
                 program[name] = unit
-
-
-class Sums:
-    """Least depth of each sample, and sums of what it sees (lib/sums.glsl)."""
-
-    def __init__(self, device: Device, samples: int, values: int) -> None:
-        self.nearest = Memory(device, samples, 1, "u4")
-        self.words = [Memory(device, values * samples, 1, "u4") for _ in range(2)]
-
-    def clear(self, job: Job) -> None:
-        """Nothing is seen."""
-        self.nearest.fill(job, True)
-        for memory in self.words:
-            memory.fill(job, False)
-
-    def bind(self) -> None:
-        """To the image units of lib/sums.glsl."""
-        for unit, memory in enumerate([self.nearest, *self.words], 1):
-            memory.bind(unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +108,7 @@ class PointClouds(Stage):
             part = Part(sheet, (*layout.size, layout.columns, 0.0), first, count)
             if stopped:
                 self._stop(job, part, job.atlas.depth)
-            self._splat(job, part)
+            splat(job, self._buffers, part)
             program = job.masked_program if job.mask is not None else job.program
             resolve = program("tile.vert", "points_resolve.frag", defines=CONSTANTS, version=VERSION)
             resolve["first_view"] = first
@@ -153,13 +126,15 @@ class PointClouds(Stage):
         sheet = self._sheet(job, (width, rows), True, stopped)
         for first in range(0, height, rows):
             part = Part(sheet, (width, rows, float(first), 0.0))
-            self._find_offsets(job, part)
+            draw = job.draw
+            key = sheet, first, draw.viewmap, draw.offsets.tobytes(), draw.flip_x, draw.flip_y
+            job.kept.get("points' cameras", key, lambda part=part: self._find_offsets(job, part))  # type: ignore[misc]
             if stopped:
                 self._stop(job, part, panel.depth)
             if quads:
                 self._quads.draw(job, part)
             else:
-                self._splat(job, part)
+                splat(job, self._buffers, part)
             self._put(job, part, panel, quads)
 
     def _sheet(self, job: Job, size: tuple[int, int], panel: bool, stopped: bool) -> Sheet:
@@ -192,53 +167,6 @@ class PointClouds(Stage):
         ctx.depth_func = "1"
         job.cover(program)
         ctx.depth_func = "<"
-
-    def _splat(self, job: Job, part: Part) -> None:
-        """Find the nearest of all surfels, then sum up those that are seen."""
-        ctx, sheet = job.device.ctx, part.sheet
-        samples, values = (3 * sheet.size[0] * sheet.size[1], 2) if sheet.panel else (sheet.size[0] * sheet.size[1], 4)
-        sums = job.kept.get(("sums", sheet.panel), samples, lambda: Sums(job.device, samples, values))
-        sums.clear(job)
-        self._buffers.ready.bind(0)
-        sums.bind()
-        lattice = self._lattice(job, sheet)
-        for nearest in (True, False):
-            ctx.memory_barrier()
-            defines: Defines = {
-                **self._buffers.switches(job), "PANEL": sheet.panel, "STOPPED": sheet.stops is not None, "NEAREST": nearest,
-                "LATTICE": lattice is not None, "UNITS": lattice.units if lattice else 0,
-                "SLOTS": len(lattice.slots) if lattice else 0,
-            }
-            program = job.program("points_splat.comp", defines=defines, version=VERSION)
-            sheet.give(program)
-            give_draw(program, job, part.place)
-            program["count"] = self._buffers.count
-            if lattice is not None:
-                program["phase_step"], program["flip"] = lattice.step, (job.draw.flip_x, job.draw.flip_y)
-                program["slots"].write(lattice.slots.tobytes())
-            if "first_view" in program:
-                program["first_view"] = part.first
-            program.run(*work_groups(self._buffers.count), part.count)
-        ctx.memory_barrier()
-
-    def _lattice(self, job: Job, sheet: Sheet) -> Lattice | None:
-        """Where sub-pixels of neighbouring cameras lie on a panel, if on a lattice; binds what the shader reads of it."""
-        if sheet.offsets is None:
-            return None
-        draw, size = job.draw, (job.draw.camera.width, job.draw.camera.height)
-        assert draw.viewmap is not None
-        viewmap = draw.viewmap
-
-        def make() -> tuple[Lattice | None, Any]:
-            lattice = find_lattice(viewmap, size, draw.offsets)
-            return lattice, lattice and job.device.ctx.texture((size[1], 1), 1, lattice.starts.tobytes(), dtype="f4")
-
-        lattice, starts = job.kept.get("lattice", (viewmap, size, draw.offsets.tobytes()), make)
-        sheet.offsets.bind_to_image(4, write=False)
-        if lattice is not None:
-            starts.bind_to_image(5, write=False)
-        found: Lattice | None = lattice
-        return found
 
     def _put(self, job: Job, part: Part, panel: Panel, quads: bool) -> None:
         """Normalise a band into the panel's colours and depths, a channel at a time: they may be seen apart."""

@@ -47,10 +47,10 @@ class SurfelBuffers:
         points = np.concatenate(parts).astype(np.float32)
         points = points[space_filling_order(points[:, :3])]
         self.count = len(points)
-        most = MEMORY_WIDTH * device.limits.texture // RECORD
+        most = min(MEMORY_WIDTH * device.limits.texture // RECORD, device.limits.storage // (4 * FLOATS))
         if self.count > most:
             raise UnsupportedError(
-                f"{self.count} points are more than a texture of this device holds, {most} ({device.renderer}): "
+                f"{self.count} points are more than shaders of this device can read, {most} ({device.renderer}): "
                 "choose fewer, or engine='cpu'"
             )
         materials = [cloud.material for cloud in clouds]

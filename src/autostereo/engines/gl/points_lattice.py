@@ -32,12 +32,15 @@ class Lattice:
     slots : ndarray of shape (S, 4), float32
         Least and greatest camera offset, ascending; between which phases. A camera belongs to the last slot that begins
         at it or before.
+    exact : bool
+        Each slot is one camera, and all units found in it are its.
     """
 
     units: int
     step: float
     starts: NDArray[np.float32]
     slots: NDArray[np.float32]
+    exact: bool
 
 
 def find_lattice(viewmap: ViewMap, size: tuple[int, int], offsets: NDArray[np.float64]) -> Lattice | None:
@@ -45,10 +48,10 @@ def find_lattice(viewmap: ViewMap, size: tuple[int, int], offsets: NDArray[np.fl
     found = _phases(viewmap, size[1])
     if found is None:
         return None
-    units, step, starts = found
+    units, along, starts = found
     if viewmap.reverse and viewmap.table is None:
-        step, starts = -step, -starts
-    step -= round(step)
+        along, starts = -along, -starts
+    step = along - round(along)
     slots = min(MOST_SLOTS, round(1 / abs(step))) if abs(step) > 1e-6 else 1
     slots = slots if viewmap.continuous else min(slots, viewmap.views)
     if slots < 2:
@@ -59,7 +62,8 @@ def find_lattice(viewmap: ViewMap, size: tuple[int, int], offsets: NDArray[np.fl
     if step < 0:
         step, starts, phases = -step, -starts, 1 - phases[:, ::-1]
     starts = starts - np.floor(starts)
-    return Lattice(units, step, starts.astype(np.float32), np.hstack([cameras, phases]).astype(np.float32))
+    exact = viewmap.table is not None and slots == viewmap.views  # phases of tables lie between those of slots' ends
+    return Lattice(units, step, starts.astype(np.float32), np.hstack([cameras, phases]).astype(np.float32), exact)
 
 
 def _phases(viewmap: ViewMap, height: int) -> tuple[int, float, NDArray[np.float64]] | None:
@@ -80,8 +84,8 @@ def _phases(viewmap: ViewMap, height: int) -> tuple[int, float, NDArray[np.float
     if len(viewmap.offsets) > 1 and viewmap.cell_mode != 0:
         return None
     channels = viewmap.offsets[0]
-    for units, step in ((1, 0.0), (3, viewmap.a / 3)):
-        error = channels - channels[0] - step * np.arange(3)
+    for units, between in ((1, 0.0), (3, viewmap.a / 3)):
+        error = channels - channels[0] - between * np.arange(3)
         if np.abs(error - np.round(error)).max() < UNEVEN:
             return units, viewmap.a / units, viewmap.b * rows + channels[0]
     return None

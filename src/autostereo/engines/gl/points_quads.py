@@ -1,9 +1,9 @@
 """Points by covering quads: a quad around what all cameras see of a surfel (Hübner 2007b, sections 3.2 and 3.3.2).
 
-They are blended twice, per channel of a panel, as both blendings have a value for each: "min", and "add". The paper's own
-1+1 pass draws once, in K groups that each keep their nearest surfel, and blends the K in the last pass; of surfels in
-one group that overlap it loses all but one. Its reason, that float textures could not be blended into, is gone. With
-`alpha="averaged"` or `"minimal"` it is drawn for comparison (points_groups.py).
+They are blended twice, per channel of a panel, as both blendings have a value for each: "min", and "add". The paper's
+own 1+1 pass draws once, in K groups that each keep their nearest surfel, and blends the K in the last pass; of surfels
+in one group that overlap it loses all but one. Its reason, that float textures could not be blended into, is gone.
+With `alpha="averaged"` or `"minimal"` it is drawn for comparison (points_groups.py).
 """
 
 from __future__ import annotations

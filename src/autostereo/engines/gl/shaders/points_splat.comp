@@ -1,4 +1,4 @@
-// Surfels to the samples that see them, an invocation a surfel (and view): its pixels, of a panel those around its
+// Surfels to the samples that see them, an invocation a surfel (view, band of rows): its pixels, of a panel those around its
 // projections for all cameras (PANEL; Huebner 2007b, section 3.2), meet its disc with the ray of each sample. Run twice: for
 // the least depth (NEAREST), then for the shares of those within their own radius of it.
 #include "lib/frame.glsl"
@@ -15,6 +15,7 @@
 layout(local_size_x = 64) in;
 
 uniform uint count;
+uniform int band_rows;      // an invocation's share of a picture, or of a band of the panel
 #ifdef PANEL
 layout(rgba32f, binding = 4) readonly uniform image2D camera_offsets;  // of sub-pixels
 uniform vec2 reach;      // least and greatest camera offset
@@ -73,21 +74,29 @@ void splat(uint sample_number, int channel, float v, float dx, float dy, float s
 }
 
 #ifdef PANEL
-// A channel of a pixel, if its camera lies between these offsets.
+// A channel of a pixel, if its camera lies between these offsets; EXACT: it is the first of them.
 void splat_channel(ivec2 pixel, int c, vec2 ends) {
     ivec2 at = pixel - ivec2(0, int(sheet.z));
-    vec3 v = imageLoad(camera_offsets, at).rgb;
-    float camera = c == 0 ? v.x : c == 1 ? v.y : v.z, column = c == 0 ? columns.x : c == 1 ? columns.y : columns.z;
-    if (camera >= ends.x && camera < ends.y) {
-        float dx = (float(pixel.x) + column - window.z) / lens.x - camera * depth_range.w;
-        float dy = -(float(pixel.y) + row - window.w) / lens.y - lens.w * depth_range.w;
-#ifdef STOPPED
-        float stop = texelFetch(stops, at, 0)[c];
+#ifdef EXACT
+    float camera = ends.x;
 #else
-        float stop = FAR;
+    vec3 v = imageLoad(camera_offsets, at).rgb;
+    float camera = c == 0 ? v.x : c == 1 ? v.y : v.z;
 #endif
-        splat(3u * uint(at.y * int(window.x) + at.x) + uint(c), c, camera, dx, dy, stop);
+    float column = c == 0 ? columns.x : c == 1 ? columns.y : columns.z;
+#ifndef EXACT
+    if (camera < ends.x || camera >= ends.y) {
+        return;
     }
+#endif
+    float dx = (float(pixel.x) + column - window.z) / lens.x - camera * depth_range.w;
+    float dy = -(float(pixel.y) + row - window.w) / lens.y - lens.w * depth_range.w;
+#ifdef STOPPED
+    float stop = texelFetch(stops, at, 0)[c];
+#else
+    float stop = FAR;
+#endif
+    splat(3u * uint(at.y * int(window.x) + at.x) + uint(c), c, camera, dx, dy, stop);
 }
 #endif
 
@@ -109,12 +118,15 @@ void main() {
     vec4 box = record(number, BOX);
     vec2 low, high;
 #ifdef PANEL
-    vec4 bounds = vec4(0.0, sheet.z, window.x, min(sheet.z + sheet.y, window.y));
+    float first_row = sheet.z + float(int(gl_WorkGroupID.z) * band_rows);
+    vec4 bounds = vec4(0.0, first_row, window.x, min(min(sheet.z + sheet.y, window.y), first_row + float(band_rows)));
     find_quad(place.xyz, box, reach, bounds, low, high);
 #else
-    int tile = int(gl_WorkGroupID.z), tile_columns = int(sheet.z);
+    int height = int(atlas_size.w), bands = (height + band_rows - 1) / band_rows;
+    int tile = int(gl_WorkGroupID.z) / bands, first_row = int(gl_WorkGroupID.z) % bands * band_rows;
+    int tile_columns = int(sheet.z);
     float v = views[first_view + tile].x;
-    vec4 bounds = vec4(0.0, 0.0, atlas_size.zw);
+    vec4 bounds = vec4(0.0, first_row, atlas_size.z, min(first_row + band_rows, height));
     find_quad(place.xyz, box, vec2(v), bounds, low, high);
 #endif
     if (low.x >= high.x) {
@@ -143,7 +155,11 @@ void main() {
                     break;
                 }
                 slot = slots[k];
+#ifdef EXACT
+                ends = slot.xy;
+#else
                 ends = vec2(k == 0 ? -FAR : slot.x, k == SLOTS - 1 ? FAR : slots[k + 1].x);
+#endif
                 find_quad(place.xyz, box, slot.xy, bounds, low, high);
                 range = float(UNITS) * (flip.x ? window.x - vec2(high.x, low.x) : vec2(low.x, high.x));
                 y = low.y;
@@ -178,7 +194,7 @@ void main() {
 #endif
 #else
     ivec2 origin = ivec2(tile % tile_columns, tile / tile_columns) * ivec2(atlas_size.zw);
-    uint offset = uint(tile * width * int(bounds.w));
+    uint offset = uint(tile * width * height);
     ivec4 range = ivec4(low, high);
     int x = range.x, y = range.y;
     while (y < range.w) {  // one loop, as above
