@@ -183,6 +183,25 @@ def test_shared_lookups_stay_near_the_exact_rays(together, scene):
     assert (one != many).any(), "nothing was shared"
 
 
+@pytest.mark.parametrize("flips", [(False, False), (True, True)])
+@pytest.mark.parametrize("display", ["wavelength-selective", "stereo"])
+@pytest.mark.parametrize("scene", ["lights", "two", "mip", "all modes, a mesh"])
+def test_the_order_of_columns_changes_nothing(monkeypatch, together, scene, display, flips):
+    """Panels of 75 columns: two runs of four periods of 8, and a part of one."""
+    from autostereo.engines.gl import volume as stage
+
+    need_device()
+    wide = aus.Display.stereo if display == "stereo" else aus.Display.wavelength_selective
+    shown = replace(wide(75, H), flip_x=flips[0], flip_y=flips[1])
+    close = replace(RIG, position=(0.1, 0.1, 1.4))  # volumes reach beyond the panel
+    for rig in (RIG, close):
+        drawn = [aus.render(scenes()[scene], shown, rig, engine="gl").pixels.copy()]
+        with monkeypatch.context() as patch:
+            patch.setattr(stage, "sorted_period", lambda job, group: 0)
+            drawn.append(aus.render(scenes()[scene], shown, rig, engine="gl").pixels)
+        np.testing.assert_array_equal(*drawn)
+
+
 def test_what_is_shared_is_bounded_by_its_distance(monkeypatch, together):
     """In a scalar that is linear in the picture's X a lookup that is x voxels beside the ray is off by x steps."""
     from autostereo.engines.gl import volume as stage

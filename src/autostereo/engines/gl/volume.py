@@ -11,7 +11,8 @@ too. A ray's scalar is then that of a lookup at most NEAR voxels beside it, carr
 looked up with it (Taylor's first order): it is off by no more than NEAR·max|∂s/∂x − g|, not at all where scalars are
 linear. Without light there is no gradient; rays share within 2·NEAR_UNLIT voxels, and are off by NEAR_UNLIT·|∂s/∂x|.
 Each ray has its own classification. Displays that show one view in all of a pixel need one ray a pixel.
-`volume="exact"` also lights slabs in their middle, not by the mean of the light at their ends.
+`volume="exact"` also lights slabs in their middle, not by the mean of the light at their ends. Columns of panels with a
+table are drawn in an order in which neighbours show the same views (lib/sorted.glsl).
 
 Order of a scene: isosurfaces are opaque and come before points; then volumes that compose, together; then those of the
 greatest value one by one (engines/reference/picture.py).
@@ -44,6 +45,7 @@ from .volume_space import most_half_spaces, placing, put, put_units
 
 TOGETHER = 4  # volumes that compose in one march: each takes three of the 16 texture units that there are at least
 NEAR, NEAR_UNLIT = 0.75, 0.25  # voxels that a shared lookup may be beside a ray
+FEW_COLUMNS = 4  # of a table whose single rays are sorted
 LENGTHS = 8  # lengths of slabs per doubling, for which tables are made
 SHADERS = {
     "composite": ("volume.vert", "volume.frag"),
@@ -112,11 +114,29 @@ class Rays(Stage):
                 assert slices is not None
                 slices_on_panel(job, program, slices.slabs, panel)
                 continue
+            period = sorted_period(job, group)
+            drawn = self._sorted(job, panel).target if period else target
+            put_units(program, period=period)
             for channel, mask in enumerate(masks(job, group)):
                 put_units(program, channel=channel)
-                write_only(target, mask)
-                render(job, program, (target, job.device.ctx.NOTHING, False))
-            write_only(target)
+                write_only(drawn, mask)
+                render(job, program, (drawn, job.device.ctx.NOTHING, False))
+            write_only(drawn)
+            if period:
+                self._put_in_order(job, group, panel, period)
+
+    def _sorted(self, job: Job, panel: Panel) -> Panel:
+        made: Panel = job.kept.get("sorted panel", panel.size, lambda: Panel(job.device, panel.size))
+        return made
+
+    def _put_in_order(self, job: Job, group: list[Volume], panel: Panel, period: int) -> None:
+        """Copy what a group has drawn with its columns in another order to the panel."""
+        defines: Defines = {"PANEL": True, "SORTED": True, "VOLUMES": len(group)}
+        program = job.masked_program("volume.vert", "sorted.frag", defines=defines)
+        put(program, reach=job.draw.culling, **placing(group, job.draw.camera))
+        self._sorted(job, panel).color.use(0)
+        put_units(program, period=period, picture=0)
+        render(job, program, (panel.target, job.device.ctx.NOTHING, False))
 
     def _slices(self, job: Job) -> Slices | None:
         return make_slices(self._all, job.draw.camera, job.draw.options.step)
@@ -131,6 +151,7 @@ class Rays(Stage):
             **self._switches(job, group),
             "COARSE": self._coarse,
             "PANEL": on_panel,
+            "SORTED": on_panel and sorted_period(job, group) > 0,
             "LANES": lanes(job, group),
             "OPAQUE": beneath is not None and has_opaque(job),
             "COVERED": beneath is not None,
@@ -249,6 +270,20 @@ def apart(job: Job, group: list[Volume]) -> bool:
     options = job.draw.options
     alone = job.device.is_hardware or options.volume == "exact"
     return alone and not by_slices(job, group) and options.alpha != "averaged"
+
+
+def sorted_period(job: Job, group: list[Volume]) -> int:
+    """Columns of a table after which a panel shows the same views, if its columns are drawn in another order, else 0.
+
+    So that neighbouring fragments show the same views (lib/sorted.glsl). Single rays of many views differ less from
+    column to column than from period to period. Isosurfaces and slices write or blend in place.
+    """
+    assert job.mask is not None
+    table = job.mask.viewmap.table
+    if table is None or group[0].mode == "iso" or by_slices(job, group):
+        return 0
+    period: int = table.shape[1]
+    return period if 1 < period and (lanes(job, group) == 3 or period <= FEW_COLUMNS) else 0
 
 
 def masks(job: Job, group: list[Volume]) -> tuple[tuple[bool, ...], ...]:

@@ -4,6 +4,9 @@
 #ifdef PANEL
 #include "lib/viewmap.glsl"
 uniform vec2 reach;                  // least and greatest camera offset
+#ifdef SORTED
+#include "lib/sorted.glsl"
+#endif
 #else
 #include "lib/views.glsl"
 uniform int first_view;
@@ -34,6 +37,10 @@ void main() {
     vec2 corner = vec2((gl_VertexID & 1) == 0 ? low.x : high.x, (gl_VertexID & 2) == 0 ? low.y : high.y);
 #ifdef PANEL
     corner = vec2(flip.x ? size.x - corner.x : corner.x, flip.y ? size.y - corner.y : corner.y);
+#ifdef SORTED
+    bool right = ((gl_VertexID & 1) != 0) != flip.x;  // whole runs of periods, in which columns change places
+    corner.x = right ? min(float(start_of(int(corner.x) - 1) + RUN * period), size.x) : float(start_of(int(corner.x)));
+#endif
 #endif
     float z = clamp(window_from_depth(max(nearest, near)), 0.0, 1.0);
     gl_Position = vec4(2.0 * (corner + origin) / target - 1.0, 2.0 * z - 1.0, 1.0);

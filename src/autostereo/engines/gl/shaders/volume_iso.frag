@@ -11,6 +11,9 @@
 #include "lib/filtering.glsl"
 #include "lib/volume.glsl"
 #include "lib/volume_light.glsl"
+#ifdef SORTED
+#include "lib/sorted.glsl"
+#endif
 #include "lib/volume_target.glsl"
 
 uniform float level;

@@ -9,6 +9,9 @@
 #include "lib/lanes.glsl"
 #include "lib/filtering.glsl"
 #include "lib/volume.glsl"
+#ifdef SORTED
+#include "lib/sorted.glsl"
+#endif
 #include "lib/volume_target.glsl"
 
 uniform sampler2D most_colors;  // of the range of scalars; alpha: share of the greatest opacity

@@ -1,7 +1,7 @@
 // Where a fragment of a volume lies: in the tile of a view, or on a panel, where its sub-pixels have eyes of their own.
 // Needs frame.glsl, color.glsl, lanes.glsl, volume.glsl; views.glsl, or viewmap.glsl and cameras.glsl with the switch PANEL.
 //
-// Switches: OPAQUE: rays end at depths drawn before; COVERED: something was drawn before.
+// Switches: OPAQUE: rays end at depths drawn before; COVERED: something was drawn before; SORTED (sorted.glsl).
 
 #ifdef PANEL
 uniform vec3 columns;          // where in a pixel the channels are sampled
@@ -20,6 +20,7 @@ uniform vec3 background;
 #endif
 
 LANE ray_length;               // per unit of depth
+ivec2 pixel;
 ivec3 order;                   // channel that a lane shows, if there are three
 
 // 1 at the channel that a lane shows.
@@ -49,9 +50,13 @@ void start_rays() {
     left = 1.0;
     twins = false;
     order = ivec3(0, 1, 2);
+    pixel = ivec2(gl_FragCoord.xy);
+#ifdef SORTED
+    pixel.x = shown_at(pixel.x, int(window.x));
+#endif
 #ifdef PANEL
-    ivec2 at = ivec2(gl_FragCoord.xy), picture = mirrored(at, ivec2(window.xy));
-    vec3 eyes = offsets_of_subpixels(at.x, at.y);
+    ivec2 picture = mirrored(pixel, ivec2(window.xy));
+    vec3 eyes = offsets_of_subpixels(pixel.x, pixel.y);
     vec2 place = vec2(picture) + vec2(0.0, sample_row);
 #if LANES == 3
     vec3 gap = abs(eyes.xyz - eyes.yzx);
@@ -80,7 +85,7 @@ void start_rays() {
     ray_length = sqrt(1.0 + turn_y * turn_y + turn_x * turn_x);
     stop = LANE(1e30);
 #ifdef OPAQUE
-    vec4 z = texelFetch(depth_before, ivec2(gl_FragCoord.xy), 0);
+    vec4 z = texelFetch(depth_before, pixel, 0);
 #if LANES == 3
     z.rgb = by_lane(z.rgb);
     vec3 depth = 1.0 / (depth_range.x - z.rgb * depth_range.y);
@@ -97,7 +102,7 @@ void start_rays() {
 // What was there before, opacity last.
 vec4 before() {
 #ifdef COVERED
-    return texelFetch(color_before, ivec2(gl_FragCoord.xy), 0);
+    return texelFetch(color_before, pixel, 0);
 #else
     return vec4(background, 0.0);
 #endif
