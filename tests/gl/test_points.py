@@ -241,3 +241,12 @@ def test_more_groups_than_a_texture_holds():
     scene = aus.Scene(cloud(1, most + 1), LIGHTS)
     with pytest.raises(aus.UnsupportedError, match=rf"groups {most + 1}: a texture of this device holds \d+ tiles"):
         panel(scene, SLANTED, method="covering-quad", alpha="averaged", groups=most + 1)
+
+
+@pytest.mark.parametrize("baseline", [1e-96, 1e-38, 1e-30])
+def test_cameras_as_near_as_numbers_can_tell(baseline):
+    """Where float32 cannot part them, no lattice tells whose a sub-pixel is."""
+    need_device()
+    scene, rig = scenes()["mixed"], replace(RIG, baseline=baseline)
+    for display in ("continuous, mirrored", "wavelength-selective", "slanted"):
+        assert_alike(panel(scene, DISPLAYS[display], rig=rig), panel(scene, DISPLAYS[display], "reference", rig=rig))

@@ -71,6 +71,12 @@ def test_any_lens_and_table(viewmap):
         assert_in_slots(viewmap, lattice)
 
 
+@pytest.mark.parametrize(("spread", "middle"), [(0.0, 0.0), (1e-96, 0.0), (1e-38, 0.0), (1e-3, 1e4)])
+def test_cameras_that_are_too_near_for_float32(spread, middle):
+    for viewmap in (MAPS["per pixel"], ViewMap(8, a=0.3, offsets=np.array([[0.0, 0.1, 0.2]]), continuous=True)):
+        assert find_lattice(viewmap, (WIDTH, HEIGHT), middle + spread * np.arange(8)) is None
+
+
 def test_what_has_no_lattice():
     offsets = np.linspace(-1, 1, 6)
     uneven = ViewMap(6, table=np.array([[[0, 1, 3], [2, 4, 5]]]))

@@ -15,6 +15,7 @@ from ...viewmap import ViewMap, offset_at
 
 MOST_SLOTS = 64
 SLACK = 1e-3  # of a phase: what rounding may change, and more
+APART = 1e-5  # of the greatest offset: slots' cameras that are nearer than this are too near for float32
 UNEVEN = 1e-4  # steps between channels may differ by so much of a phase
 
 
@@ -57,6 +58,9 @@ def find_lattice(viewmap: ViewMap, size: tuple[int, int], offsets: NDArray[np.fl
     if slots < 2:
         return None
     cameras, phases = _slots(viewmap, slots, offsets)
+    least = APART * np.abs(cameras).max() + np.finfo(np.float32).tiny
+    if np.diff(cameras[:, 0]).min() < least:
+        return None  # a camera does not tell its slot
     slack = SLACK + 4e-7 * abs(step) * units * size[0]
     phases += slack * np.array([-1, 1])
     if step < 0:

@@ -45,7 +45,7 @@ from .volume_space import most_half_spaces, placing, put, put_units
 
 TOGETHER = 4  # volumes that compose in one march: each takes three of the 16 texture units that there are at least
 NEAR, NEAR_UNLIT = 0.75, 0.25  # voxels that a shared lookup may be beside a ray
-FEW_COLUMNS = 4  # of a table whose single rays are sorted
+FEW_COLUMNS, MOST_COLUMNS = 4, 16  # of a table that is sorted: a ray a fragment, three rays
 LENGTHS = 8  # lengths of slabs per doubling, for which tables are made
 SHADERS = {
     "composite": ("volume.vert", "volume.frag"),
@@ -283,7 +283,7 @@ def sorted_period(job: Job, group: list[Volume]) -> int:
     if table is None or group[0].mode == "iso" or by_slices(job, group):
         return 0
     period: int = table.shape[1]
-    return period if 1 < period and (lanes(job, group) == 3 or period <= FEW_COLUMNS) else 0
+    return period if 1 < period <= (MOST_COLUMNS if lanes(job, group) == 3 else FEW_COLUMNS) else 0
 
 
 def masks(job: Job, group: list[Volume]) -> tuple[tuple[bool, ...], ...]:
