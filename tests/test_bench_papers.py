@@ -312,4 +312,4 @@ def test_raw_data_of_the_papers_is_read(tmp_path, name, file, side):
     (tmp_path / "volumes").mkdir()
     np.arange(side**3, dtype=np.uint8).tofile(tmp_path / "volumes" / file)
     scene, words = volume_scene(studio, name)
-    assert words == f"data: {file}" and scene.objects[0].shape == (side,) * 3
+    assert words == f"data: {file}, {side}×{side}×{side} voxels" and scene.objects[0].shape == (side,) * 3

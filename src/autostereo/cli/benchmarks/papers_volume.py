@@ -57,7 +57,9 @@ def volume_scene(studio: PapersStudio, name: str) -> tuple[Scene, str]:
         path = folder / "volumes" / file
         if path.is_file():
             hints: dict[str, Any] = {"shape": (side,) * 3, "dtype": "uint8"} if path.suffix == ".raw" else {}
-            return load(path, **hints), f"data: {path.name}"
+            scene = load(path, **hints)
+            shape = "×".join(str(n) for item in scene.objects if isinstance(item, Volume) for n in item.shape)
+            return scene, f"data: {path.name}, {shape} voxels"  # not always of the size that the paper names
     voxels = max(32, side // studio.options.divisor)
     return Scene((stand_in(voxels),)), f"data: stand-in {stand_in.__name__}({voxels})"
 

@@ -56,6 +56,7 @@ STAGES: tuple[tuple[type, type[Any]], ...] = (
     (Points, PointClouds),
     (Volume, Volumes),
 )
+FAR_MOVED = 100.0  # of a scene's diagonal
 METHODS: dict[type, tuple[str, ...]] = {
     Mesh: (
         *("single-pass", "n-pass", "n-pass-subres", "n-pass-masked"),
@@ -115,9 +116,15 @@ class GlEngine:
             return Prepared(scene, middle, make_stages(device, scene, middle), Blocks(device))
 
     def update(self, prepared: Prepared, scene: Scene) -> Prepared:
-        """The same objects under other transforms and transfer functions: stages of what has not changed stay."""
-        prepared.kept.forget("vertex array")  # they hold on to the buffers of stages that are replaced
+        """The same objects under other transforms and transfer functions: stages of what has not changed stay.
+
+        A scene that has moved far from where it was prepared is prepared again: its middle is the origin of float32.
+        """
+        low, high = scene.bounds
+        if np.linalg.norm((low + high) / 2 - prepared.middle) > FAR_MOVED * np.linalg.norm(high - low):
+            return self.prepare(scene)
         with self.device as device:
+            prepared.kept.forget("vertex array")  # they hold on to the buffers of stages that are replaced
             return replace(prepared, scene=scene, stages=make_stages(device, scene, prepared.middle, prepared))
 
     def draw(self, prepared: Prepared, draw: Draw, target: Target) -> None:

@@ -162,7 +162,7 @@ class Drawing:
         self.chunks = chunks(parts, self.queue.most)
         self.room = room = 2 * max(sum(piece[2] for piece in chunk) for chunk in self.chunks)
         self.triangles = kept.get("plane triangles", room, lambda: Memory(device, TRIANGLE_TEXELS * room, 4, "u4"))
-        self.corners = kept.get("plane corners", None, self._send_corners)
+        self.corners = kept.get("plane corners", tuple(parts), self._send_corners)
         self.one_view = job.draw.method == ONE_VIEW
         self.on_panel = job.columns is not None
         self.size = views_of_a_block(job)
