@@ -24,7 +24,7 @@ class ViewStack:
     depth : ndarray of shape (V, H, W), float32, optional
         Eye depth; inf where nothing was hit.
     reused : float, optional
-        Share of the covered samples whose colour was reused from a nearby view (`shading="reuse"` only).
+        Share of the covered samples whose colour was reused from a nearby view (`shading="reuse"` on engine cpu only).
     """
 
     color: NDArray[np.uint8]
@@ -122,7 +122,7 @@ class Panel:
     pixels : ndarray of shape (H, W, 3), uint8
         Rows from the top.
     reused : float, optional
-        Share of the covered samples whose colour was reused (`shading="reuse"` only).
+        Share of the covered samples whose colour was reused (`shading="reuse"` on engine cpu only).
     """
 
     pixels: NDArray[np.uint8]

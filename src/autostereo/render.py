@@ -377,10 +377,10 @@ def check_in_view(scene: Scene, rig: Rig) -> None:
 
 
 def share(target: Target, options: Options) -> float | None:
-    """Share of samples whose colour was reused, when that was asked for."""
-    if options.shading != "reuse":
+    """Share of samples whose colour was reused, when that was asked of an engine that counts; gl shades them all."""
+    if options.shading != "reuse" or target.covered == 0:
         return None
-    return target.reused / target.covered if target.covered else 0.0
+    return target.reused / target.covered
 
 
 def describe(shape: tuple[int, ...]) -> str:

@@ -22,6 +22,9 @@ def bench(
     name: Annotated[
         str, typer.Argument(metavar="WHAT", help="What to measure: mesh, volume, points or papers.")
     ] = "mesh",
+    works: Annotated[
+        list[str] | None, typer.Argument(metavar="WORK", help="Only these, as --only.", show_default=False)
+    ] = None,
     json: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Also write the figures here.")] = None,
     only: Annotated[list[str] | None, typer.Option("--only", metavar="WORK", help="Only this; repeatable.")] = None,
     repeats: Annotated[
@@ -35,7 +38,8 @@ def bench(
         float | None, typer.Option("--budget", metavar="SECONDS", help="Begin no work any more after this time.")
     ] = None,
     plots: Annotated[
-        Path | None, typer.Option("--plots", metavar="DIR", help="Charts (PNG) of papers, as the papers have them.")
+        Path | None,
+        typer.Option("--plots", "--plot", metavar="DIR", help="Charts (PNG) of papers, as the papers have them."),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Small pictures, three rounds: shows that it works.")] = False,
     quiet: common.Quiet = False,
@@ -51,7 +55,7 @@ def bench(
       autostereo bench mesh --data data --json bench.json
       autostereo bench volume --only views-48 --only panels-8 --repeats 15
       autostereo bench points
-      autostereo bench papers --only 2007a-table1 --json papers.json --plots charts
+      autostereo bench papers 2007a-table1 2007b-points --json papers.json --plots charts
     """
     if name not in KERNELS:
         raise InputError(f"bench: expected one of {', '.join(KERNELS)}, got {name!r}")
@@ -62,7 +66,7 @@ def bench(
     from .benchmarks import report
     from .benchmarks.suite import BenchOptions
 
-    options = BenchOptions(quick=quick, only=tuple(only or ()), data=data, repeats=repeats, budget=budget)
+    options = BenchOptions(quick=quick, only=(*(works or ()), *(only or ())), data=data, repeats=repeats, budget=budget)
     common.announce_compilation("cpu", *KERNELS[name])
     results = report.bench(name, options, json, common.note)
     if plots is not None:

@@ -79,6 +79,8 @@ def render(
     with common.working("rendering"):
         panel = draw(scene, where, rig, method=method, engine=engine, options=options)
     note(f"rendered in {perf_counter() - start:.2f} s")
+    if panel.reused is not None:
+        note(f"{panel.reused:.0%} of the samples have a nearby view's colour")
     with common.working("writing"):
         panel.save(path)
     say(f"{path}  {panel.width}×{panel.height}")
