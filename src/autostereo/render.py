@@ -188,8 +188,8 @@ class Renderer:
         """The array to draw into: the caller's, or one kept from frame to frame."""
         if out is not None:
             fits = isinstance(out, np.ndarray) and out.shape == shape and out.dtype == dtype
-            if not fits or not out.flags.c_contiguous:
-                raise InputError(f"out: expected a contiguous {np.dtype(dtype)} array of shape {shape}")
+            if not fits or not out.flags.c_contiguous or not out.flags.writeable:
+                raise InputError(f"out: expected a contiguous, writeable {np.dtype(dtype)} array of shape {shape}")
             return out
         held = self._held.get(name)
         if held is None or held.shape != shape:

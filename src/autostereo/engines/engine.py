@@ -169,7 +169,7 @@ def get_engine(name: str, scene: Scene | None = None) -> Engine:
     """Return the engine called `name`; "auto" is the fastest there is, for the scene if one is given."""
     if name == "auto":
         name = "cpu" if scene is None else choose_engine(scene)
-    if name not in ENGINES:
+    if not isinstance(name, str) or name not in ENGINES:
         raise UnsupportedError(f"engine {name!r}: there are {', '.join(ENGINES)} and auto")
     if name not in _made:
         _made[name] = ENGINES[name]()

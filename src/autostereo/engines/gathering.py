@@ -91,5 +91,5 @@ def check_observe(panel: Pixels, wanted: NDArray[np.float64], crosstalk: float) 
         raise InputError(f"panel: expected (H, W, 3) uint8, got {panel.shape} {panel.dtype}")
     if wanted.shape != panel.shape[1:] or not np.isfinite(wanted).all():
         raise InputError(f"wanted: expected finite phases of shape {panel.shape[1:]}, got {wanted.shape}")
-    if not 0 <= crosstalk < 1:
+    if not isinstance(crosstalk, (int, float, np.number)) or not 0 <= crosstalk < 1:
         raise InputError(f"crosstalk: expected a number in [0, 1), got {crosstalk!r}")

@@ -24,6 +24,6 @@ def get_method(name: str, engine: Engine) -> ModuleType:
     """Return the schedule called `name`, which has draw_views and draw_panel, if `engine` can draw it."""
     if name in getattr(engine, "own_methods", ()):
         return single_pass
-    if name not in METHODS or name not in engine.methods:
+    if not isinstance(name, str) or name not in METHODS or name not in engine.methods:
         raise UnsupportedError(f"method {name!r}: the {engine.name} engine has {', '.join(engine.methods)}")
     return METHODS[name]

@@ -1,0 +1,36 @@
+"""Arguments of the wrong kind: one sentence, whatever the engine."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import autostereo as aus
+from autostereo.scene.shapes import icosphere
+
+DISPLAY = aus.Display.lenticular(12, 8, 3)
+
+
+@pytest.mark.parametrize("engine", ["reference", "cpu"])
+def test_an_array_that_cannot_be_written_is_refused(engine):
+    panel, stack = np.zeros((8, 12, 3), np.uint8), np.zeros((3, 8, 12, 4), np.uint8)
+    panel.flags.writeable = stack.flags.writeable = False
+    renderer, rig = aus.Renderer(icosphere(1), engine=engine), aus.Rig(position=(0, 0, 4), views=3)
+    with pytest.raises(aus.InputError, match="out: expected a contiguous, writeable uint8 array of shape"):
+        renderer.render(DISPLAY, rig, out=panel)
+    with pytest.raises(aus.InputError, match="out: expected a contiguous, writeable uint8 array of shape"):
+        renderer.render_views(rig, (12, 8), out=stack)
+
+
+@pytest.mark.parametrize("wrong", ["x", None, [0.1], 1.0, -0.1, np.nan])
+def test_crosstalk_is_a_share(wrong):
+    panel = aus.render(icosphere(1), DISPLAY)
+    with pytest.raises(aus.InputError, match="crosstalk: expected a number"):
+        aus.observe(panel, DISPLAY, view=1, crosstalk=wrong)
+
+
+def test_names_that_are_lists():
+    with pytest.raises(aus.UnsupportedError, match=r"method \['n-pass'\]"):
+        aus.render(icosphere(1), DISPLAY, method=["n-pass"])
+    with pytest.raises(aus.UnsupportedError, match=r"engine \['cpu'\]"):
+        aus.render(icosphere(1), DISPLAY, engine=["cpu"])
