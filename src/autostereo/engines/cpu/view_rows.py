@@ -75,18 +75,26 @@ def _wrap(flat, reverse):
 
 
 @kernel
+def _table_views(row, views, reverse, out):
+    """Fill out (W, 3) with the views of a table's row (w, 3), which repeats."""
+    for x in range(out.shape[0]):
+        entry = x % row.shape[0]
+        for c in range(3):
+            view = row[entry, c]
+            out[x, c] = views - 1 - view if reverse else view
+
+
+@kernel
 def row_phase(r, width, table, a, b, offsets, cell_mode, height, views, continuous, reverse, out):
     """Fill out (W, 3) float64, C-contiguous, with the phases φ ∈ [0, 1) of row r; a table's phase is (view + ½)/V.
 
     `table … reverse` are those of `map_args`; equals `ViewMap.phase` bit for bit.
     """
     if table.shape[0] > 0:
-        row = table[r % table.shape[0]]
-        for x in range(width):
-            entry = x % table.shape[1]
-            for c in range(3):
-                view = row[entry, c]
-                out[x, c] = ((views - 1 - view if reverse else view) + 0.5) / views
+        _table_views(table[r % table.shape[0]], views, reverse, out)
+        flat = out.reshape(-1)
+        for i in range(3 * width):
+            flat[i] = (flat[i] + 0.5) / views
         return
     br = b * r
     if offsets.shape[0] == 1 or cell_mode == 0:
@@ -113,12 +121,7 @@ def row_camera(r, width, table, a, b, offsets, cell_mode, height, views, continu
     `table … reverse` are those of `map_args`; equals `ViewMap.camera` bit for bit.
     """
     if table.shape[0] > 0:
-        row = table[r % table.shape[0]]
-        for x in range(width):
-            entry = x % table.shape[1]
-            for c in range(3):
-                view = row[entry, c]
-                out[x, c] = views - 1 - view if reverse else view
+        _table_views(table[r % table.shape[0]], views, reverse, out)
         return
     row_phase(r, width, table, a, b, offsets, cell_mode, height, views, continuous, reverse, out)
     flat = out.reshape(-1)

@@ -15,11 +15,11 @@
 layout(local_size_x = 64) in;
 
 uniform uint count;
+uniform vec4 sheet;         // its size; first row of the panel, or columns of tiles
 uniform int band_rows;      // an invocation's share of a picture, or of a band of the panel
 #ifdef PANEL
 layout(rgba32f, binding = 4) readonly uniform image2D camera_offsets;  // of sub-pixels
 uniform vec2 reach;      // least and greatest camera offset
-uniform vec4 sheet;
 uniform vec3 columns;
 uniform float row;
 #ifdef LATTICE
@@ -30,7 +30,6 @@ uniform vec4 slots[SLOTS];  // least and greatest camera offset; between which p
 uniform bvec2 flip;
 #endif
 #else
-uniform vec4 sheet;      // size; columns of tiles
 uniform int first_view;  // of the atlas's
 #endif
 #ifdef STOPPED

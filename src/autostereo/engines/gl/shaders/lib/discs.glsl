@@ -1,4 +1,5 @@
-// Where rays meet surfels: lib/surfels.glsl says how. Needs frame.glsl and surfels.glsl; for fragment shaders.
+// Where rays meet surfels: lib/surfels.glsl says how. Needs frame.glsl and surfels.glsl.
+// What is known of the disc comes from the vertices; a compute shader, which fills it itself, defines GIVEN as nothing.
 
 #ifndef GIVEN
 #define GIVEN flat in

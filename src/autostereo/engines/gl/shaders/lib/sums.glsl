@@ -1,6 +1,6 @@
 // What samples have of surfels: the bits of the least depth; sums of weights and of weighted colours as whole numbers of 64
 // bits, steps of 1/UNIT, so that their order does not matter: low words, and high words for what these carry over. A sample
-// of a panel has a colour and a weight, one of a view three colours and a weight. Needs memory.glsl. Made by points.py.
+// of a panel has a colour and a weight, one of a view three colours and a weight. Needs memory.glsl. Made by points_splat.py.
 
 layout(r32ui, binding = 1) uniform uimage2D nearest;
 #ifndef NEAREST
