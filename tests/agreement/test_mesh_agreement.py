@@ -78,7 +78,10 @@ def assert_one_pass_is_many(scene, display, rig, engine, **options):
     np.testing.assert_array_equal(one.depth, many.depth)
     woven, found = aus.interlace(many, display).pixels, panel(scene, display, rig, engine, **options)
     if engine == "gl":  # a single pass may meet triangles by rays: silhouettes, many at 40×30, may differ
-        assert (np.abs(found.astype(int) - woven) > 1).mean() <= 0.01
+        differs = np.abs(found.astype(int) - woven) > 1
+        if differs.mean() > 0.01:  # drivers cut triangles that reach the eye coarsely: then it is to be the exact one
+            differs &= np.abs(found.astype(int) - panel(scene, display, rig, "reference", **options)) > 1
+        assert differs.mean() <= 0.01
         every = aus.Options(**options)
         found = aus.render(scene, display, rig, method="instanced", engine=engine, options=every).pixels
     np.testing.assert_array_equal(found, woven)

@@ -26,7 +26,7 @@ class Camera:
 
     For an eye-space point (X, Y, d) and a camera at offset vd:
     x = width/2 + fx·X/d + fx·vd·(1/focal − 1/d),  y = height/2 − fy·(Y − offset_y)/d − fy·offset_y/focal;
-    `shift` is added to both.
+    `shift` is added to both. The samples of a pixel are spread over `spread` of its width, about its centre.
     """
 
     eye_from_world: NDArray[np.float64]
@@ -38,6 +38,7 @@ class Camera:
     near: float
     offset_y: float = 0.0
     shift: tuple[float, float] = (0.0, 0.0)
+    spread: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)

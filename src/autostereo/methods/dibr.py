@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..engines.engine import Draw, Engine, Target
+from .by_channel import by_channel
 
 
 def reference_views(views: int, count: int) -> NDArray[np.int64]:
@@ -32,6 +33,7 @@ def draw_views(engine: Engine, prepared: Any, draw: Draw, target: Target) -> Non
     target.covered, target.reused = references.covered, references.reused
 
 
+@by_channel
 def draw_panel(engine: Engine, prepared: Any, draw: Draw, target: Target) -> None:
     """Warp view after view at the panel's size, and keep of each the sub-pixels that show it, as n_pass does."""
     from ..engines.cpu.dibr import warp

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..engines.engine import Draw, Engine, Target
+from .by_channel import by_channel
 
 
 def draw_views(engine: Engine, prepared: Any, draw: Draw, target: Target) -> None:
@@ -20,6 +21,7 @@ def draw_views(engine: Engine, prepared: Any, draw: Draw, target: Target) -> Non
         target.reused += one.reused
 
 
+@by_channel
 def draw_panel(engine: Engine, prepared: Any, draw: Draw, target: Target) -> None:
     """Draw view after view at the panel's size, and keep of each the sub-pixels that show it.
 

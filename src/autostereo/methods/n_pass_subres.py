@@ -14,6 +14,7 @@ from ..engines.engine import Draw, Engine, Target
 from ..errors import UnsupportedError
 from ..frame import ViewStack
 from . import n_pass
+from .by_channel import by_channel
 
 
 def draw_views(engine: Engine, prepared: Any, draw: Draw, target: Target) -> None:
@@ -21,6 +22,7 @@ def draw_views(engine: Engine, prepared: Any, draw: Draw, target: Target) -> Non
     raise UnsupportedError("method 'n-pass-subres': for panels only; a stack of views has n-pass and single-pass")
 
 
+@by_channel
 def draw_panel(engine: Engine, prepared: Any, draw: Draw, target: Target) -> None:
     """Draw V small views one after the other and weave them into the panel, bilinearly."""
     assert draw.viewmap is not None
@@ -33,6 +35,8 @@ def draw_panel(engine: Engine, prepared: Any, draw: Draw, target: Target) -> Non
         height=small_height,
         fx=draw.camera.fx * small_width / width,
         fy=draw.camera.fy * small_height / height,
+        shift=(draw.camera.shift[0] * small_width / width, 0.0),
+        spread=1.0,
     )
     stack = Target(np.empty((views, small_height, small_width, 4), np.uint8))
     n_pass.draw_views(engine, prepared, replace(draw, camera=camera, viewmap=None), stack)

@@ -93,10 +93,11 @@ class CpuEngine:
         sums = np.zeros(target.color.shape, np.uint16)
         nearest = None if target.depth is None else np.full(target.depth.shape, np.inf, np.float32)
         options = replace(draw.options, samples=1)
-        wide = 1 / 3 if draw.viewmap is not None and draw.options.sampling == "subpixel" else 1.0
+        own = draw.viewmap is not None and draw.options.sampling == "subpixel"
+        wide, (across, down) = 1 / 3 if own else draw.camera.spread, draw.camera.shift
         for k in range(side * side):
             x, y = (k % side + 0.5) / side, (k // side + 0.5) / side
-            camera = replace(draw.camera, shift=(wide * (0.5 - x), 0.5 - y))
+            camera = replace(draw.camera, shift=(across + wide * (0.5 - x), down + 0.5 - y))
             self._draw_stages(prepared, replace(draw, camera=camera, options=options), target)
             sums += target.color
             if nearest is not None and target.depth is not None:

@@ -29,6 +29,7 @@ class CameraNumbers(NamedTuple):
     offset_y: float
     centre_x: float
     centre_y: float
+    spread: float
 
 
 def camera_numbers(camera: Camera) -> CameraNumbers:
@@ -43,6 +44,7 @@ def camera_numbers(camera: Camera) -> CameraNumbers:
         camera.offset_y,
         0.5 * camera.width + camera.shift[0],
         0.5 * camera.height + camera.shift[1],
+        camera.spread,
     )
 
 

@@ -200,7 +200,7 @@ def draw_views(bins, surface, camera, shader, offsets, background, side, scratch
         for s in range(side * side):
             if s > 0:
                 clear_samples(0, views * count, background, scratch.halves)
-            sample = ((s % side + 0.5) / side, (s // side + 0.5) / side)
+            sample = (0.5 + camera.spread * ((s % side + 0.5) / side - 0.5), (s // side + 0.5) / side)
             at, wide = np.float32(sample[0]), np.float32(width)
             place = Place(offsets, places, views, columns[0], columns[1], at, wide)
             draw_row(draw_segment, place, span, row, k, surface, camera, shader, sample, scratch)

@@ -164,7 +164,8 @@ class GlEngine:
             device.check_texture((quilt.shape[1], quilt.shape[0]), "a quilt")
             texture = device.ctx.texture(quilt.shape[1::-1], quilt.shape[2], np.ascontiguousarray(quilt), alignment=1)
             panel = Panel(device, size)
-            panel.weave(self._gathering(device, draw), texture, tiles)
+            panel.clear()
+            panel.weave(self._gathering(device, draw), texture, tiles, (0, draw.viewmap.views))
             panel.read(out)
         return out
 

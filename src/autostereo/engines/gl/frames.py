@@ -121,7 +121,9 @@ def _draw_samples(job: Job, stages: list[Stage], depth: NDArray[np.float32] | No
     if mean is not None:
         mean.clear()
     for x, y in samples:
-        job.write_frame(replace(job.draw.camera, shift=(0.5 - x, 0.5 - y)))
+        camera = job.draw.camera
+        across, down = camera.shift
+        job.write_frame(replace(camera, shift=(across + camera.spread * (0.5 - x), down + 0.5 - y)))
         draw_tiles(job, stages)
         if mean is not None:
             mean.add(job, job.atlas.color)
@@ -228,18 +230,18 @@ def _weave_small(job: Job, stages: list[Stage], panel: Panel) -> None:
     """Small views, scaled up while they are woven (Hübner 2007a, section 2.3), as methods/n_pass_subres.py has it."""
     camera, views = job.draw.camera, len(job.draw.offsets)
     width, height = (max(1, round(side / views**0.5)) for side in panel.size)
-    small = replace(
-        camera, width=width, height=height, fx=camera.fx * width / camera.width, fy=camera.fy * height / camera.height
-    )
-    parts = list(atlases(replace(job, draw=replace(job.draw, camera=small)), "small atlas"))
-    if len(parts) > 1:
-        raise UnsupportedError(
-            f"method 'n-pass-subres': {views} views of {width}×{height} pixels are more than one atlas of this device "
-            f"holds ({parts[0].count}): choose fewer views, n-pass or single-pass"
-        )
-    _draw_samples(parts[0], stages)
-    layout = parts[0].atlas.layout
-    panel.weave(job, parts[0].atlas.color, Tiles(layout.columns, width, height, *layout.size, 4))
+    own = job.draw.options.sampling == "subpixel"
+    panel.clear()
+    for column, channels in [((1 - c) / 3, CHANNELS[c]) for c in range(3)] if own else [(0.0, ALL)]:
+        small = replace(
+            camera, width=width, height=height, fx=camera.fx * width / camera.width,
+            fy=camera.fy * height / camera.height, shift=(column * width / camera.width, 0.0),
+        )  # fmt: skip
+        for part in atlases(replace(job, draw=replace(job.draw, camera=small)), "small atlas"):
+            _draw_samples(part, stages)
+            layout = part.atlas.layout
+            tiles = Tiles(layout.columns, width, height, *layout.size, 4)
+            panel.weave(job, part.atlas.color, tiles, (part.first, part.count), channels)
 
 
 def interlace(job: Job, views: NDArray[np.uint8], first: int) -> Panel:

@@ -53,7 +53,6 @@ class Panel:
 
     def gather(self, job: Job, channels: tuple[float, ...] = ALL) -> None:
         """Add those sub-pixels of `channels` (three of 0 and 1) that the job's atlas holds."""
-        ctx = self.device.ctx
         defines: Defines = {
             "CHANNELS": job.columns is not None, "ONE_TILE": job.one_depth, "WITH_DEPTH": self.depth is not None
         }
@@ -65,20 +64,30 @@ class Panel:
             program["atlas_depth"] = 1
         program["held"], program["channels"] = (job.first, job.count), channels
         self.both.use()
-        ctx.enable_only(ctx.BLEND)
-        ctx.blend_func = ctx.ONE, ctx.ONE
-        job.cover(program)
+        self._add(job, program)
 
-    def weave(self, job: Job, quilt: Any, tiles: Tiles) -> None:
-        """Fill the panel from a quilt's texture, bilinearly, and for continuous maps between views as well."""
+    def weave(
+        self, job: Job, quilt: Any, tiles: Tiles, held: tuple[int, int], channels: tuple[float, ...] = ALL
+    ) -> None:
+        """Add what a quilt's texture holds, bilinearly, and for continuous maps between views as well.
+
+        held: the first of the quilt's views, and how many they are.
+        """
         program = job.masked_program("screen.vert", "weave.frag")
         quilt.use(0)
         program["quilt"] = 0
         program["quilt_height"] = tiles.quilt_height
         program["tile"] = tiles.columns, tiles.width, tiles.height
         program["panel_size"] = self.size
+        program["held"], program["channels"] = held, channels
         self.target.use()
-        self.device.ctx.enable_only(self.device.ctx.NOTHING)
+        self._add(job, program)
+
+    def _add(self, job: Job, program: Any) -> None:
+        """Add what a program finds to what has been gathered."""
+        ctx = self.device.ctx
+        ctx.enable_only(ctx.BLEND)
+        ctx.blend_func = ctx.ONE, ctx.ONE
         job.cover(program)
 
     def read(self, out: NDArray[np.uint8]) -> None:

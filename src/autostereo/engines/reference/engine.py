@@ -116,8 +116,8 @@ def subsample_grid(samples: int) -> tuple[Array, Array]:
 def view_samples(camera: Camera, offset: float, samples: int) -> Samples:
     """Samples (H, W, n) of one view."""
     dx, dy = subsample_grid(samples)
-    x = np.arange(camera.width)[None, :, None] + dx
-    y = np.arange(camera.height)[:, None, None] + dy
+    x = np.arange(camera.width)[None, :, None] + 0.5 + camera.spread * (dx - 0.5) - camera.shift[0]
+    y = np.arange(camera.height)[:, None, None] + dy - camera.shift[1]
     return Samples(*np.broadcast_arrays(x, y, np.float64(offset)))
 
 

@@ -1,15 +1,21 @@
 // A panel from a quilt of views of another size, bilinear within tiles and, on continuous panels, between views.
-// The same sums as engines/reference/gather.py, in the same order.
+// The same sums as engines/reference/gather.py, in the same order. Several quilts add up: what a quilt does not hold is 0.
 #include "lib/viewmap.glsl"
 
 uniform sampler2D quilt;       // row 0 is the top
 uniform int quilt_height;
 uniform ivec3 tile;            // columns of tiles; width, height of a tile; tile 0 at the bottom left
 uniform ivec2 panel_size;
+uniform ivec2 held;            // first view of the quilt, and how many
+uniform vec3 channels;         // 1 where a channel is wanted
 
 out vec4 color;
 
 float bilinear(int view, ivec2 low, ivec2 high, vec2 w, int c) {
+    view -= held.x;
+    if (view < 0 || view >= held.y) {
+        return 0.0;
+    }
     ivec2 origin = ivec2(view % tile.x * tile.y, quilt_height - (view / tile.x + 1) * tile.z);
     float a = texelFetch(quilt, origin + low, 0)[c], b = texelFetch(quilt, origin + ivec2(high.x, low.y), 0)[c];
     float d = texelFetch(quilt, origin + ivec2(low.x, high.y), 0)[c], e = texelFetch(quilt, origin + high, 0)[c];
@@ -37,7 +43,7 @@ void main() {
         float other = bilinear(min(view[c] + 1, view_count - 1), low, high, w, c);
         value = value * (1.0 - between[c]) + other * between[c];
 #endif
-        color[c] = floor(value + 0.5) / LEVELS;
+        color[c] = channels[c] * floor(value + 0.5) / LEVELS;
     }
     color.a = 1.0;
 }
