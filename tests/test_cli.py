@@ -13,6 +13,7 @@ from PIL import Image
 
 import autostereo as aus
 from autostereo.cli.app import VERBS
+from autostereo.scene import shapes
 from commandline import SMALL, SQUARE, Run, files, pixels, refused
 
 
@@ -63,6 +64,27 @@ def test_render_takes_a_camera_a_background_and_options(cli: Run, folder: Path) 
     display = aus.Display.preset("lenticular-8", reverse=True).resized(40, 30)
     panel = aus.render(scene, display, rig, options=aus.Options(samples=4, lighting="vertex"))
     assert np.array_equal(pixels("out.png"), panel.pixels)
+
+
+def test_reuse_says_what_it_saved_and_what_it_lost(cli: Run, folder: Path) -> None:
+    """Of views as of a panel: the share, and the PSNR of what was written against exact shading."""
+    rig = aus.Rig(position=(0, 0, 5), baseline=0.4, fov_y=40, views=8)
+    rig.save("rig.json")
+    ball = shapes.uv_sphere(12, 24)
+    lines = ["OFF", f"{len(ball.vertices)} {len(ball.faces)} 0", *(" ".join(map(str, v)) for v in ball.vertices)]
+    Path("ball.off").write_text("\n".join([*lines, *(f"3 {a} {b} {c}" for a, b, c in ball.faces)]), "utf-8")
+    scene = aus.load("ball.off")
+    result = cli("views", "ball.off", "-o", "v", "--size", "64x48", "--camera", "rig.json", "--shading", "reuse")
+    many = [aus.render_views(scene, rig, (64, 48), options=aus.Options(shading=s)) for s in ("reuse", "exact")]
+    assert f"{many[0].reused:.0%} of the samples" in result.err and f"PSNR {many[0].psnr(many[1]):.1f} dB" in result.err
+    result = cli("render", "ball.off", "-d", "lenticular-8", "--size", "64x48", "--camera", "rig.json",
+                 "--shading", "reuse")  # fmt: skip
+    display = aus.Display.preset("lenticular-8").resized(64, 48)
+    one = [aus.render(scene, display, rig, options=aus.Options(shading=s)) for s in ("reuse", "exact")]
+    assert f"PSNR {one[0].psnr(one[1]):.1f} dB" in result.err
+    assert np.array_equal(pixels("ball_lenticular-8.png"), one[0].pixels)
+    with pytest.raises(aus.InputError, match="expected a panel of 64×48, got 8 views of 64×48"):
+        one[0].psnr(many[0])
 
 
 def test_render_merges_its_inputs(cli: Run, folder: Path) -> None:

@@ -93,7 +93,8 @@ def test_reuse_keeps_silhouettes_and_exact_views_and_counts():
     assert len(same) >= 2  # one exact view in every set
     assert stack.reused is not None and 0.3 < stack.reused < 1.0
     error = np.mean((stack.color[..., :3].astype(float) - exact[..., :3]) ** 2)
-    assert 10 * np.log10(255**2 / error) > 35
+    assert stack.psnr(aus.ViewStack(exact)) == pytest.approx(10 * np.log10(255**2 / error))
+    assert 35 < stack.psnr(aus.ViewStack(exact)) < stack.psnr(stack) == np.inf
     single = renderer.render_views(aus.Rig(views=1), (40, 30), options=aus.Options(shading="reuse"))
     assert single.reused == 0.0
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .errors import FileError, InputError
 from .image import write_atomic, write_image
+from .memory import check_memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +68,7 @@ class ViewStack:
         """
         if columns < 1 or rows < 1 or columns * rows < self.views:
             raise InputError(f"quilt: {columns}×{rows} tiles cannot hold {self.views} views")
+        check_memory(4 * rows * self.height * columns * self.width, f"a quilt of {columns}×{rows} tiles")
         quilt = np.zeros((rows, self.height, columns, self.width, 4), dtype=np.uint8)
         quilt[..., 3] = 255
         for k in range(self.views):
@@ -92,6 +94,20 @@ class ViewStack:
             top, left = bottom - (k // columns + 1) * height, (k % columns) * width
             color[k, :, :, : quilt.shape[2]] = quilt[top : top + height, left : left + width]
         return ViewStack(color)
+
+    def psnr(self, exact: ViewStack) -> float:
+        """Peak signal-to-noise ratio in dB of the RGB of all views against another stack's; inf where they are equal.
+
+        What approximations cost, such as `shading="reuse"` or `method="dibr"`: 10·log10(255² / mean squared error).
+
+        Raises
+        ------
+        InputError
+            That is no stack of as many views of the same size.
+        """
+        if not isinstance(exact, ViewStack) or exact.color.shape != self.color.shape:
+            raise InputError(f"exact: expected {self.views} views of {self.width}×{self.height}, got {_what(exact)}")
+        return _decibels([_difference(a[..., :3], b[..., :3]) for a, b in zip(self.color, exact.color, strict=True)])
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write `path`.npz (arrays `color`, `depth`), or a folder of view_000.png, view_001.png, …
@@ -143,6 +159,33 @@ class Panel:
         """Columns W."""
         return self.pixels.shape[1]
 
+    def psnr(self, exact: Panel) -> float:
+        """Peak signal-to-noise ratio in dB against another panel; see `ViewStack.psnr`."""
+        if not isinstance(exact, Panel) or exact.pixels.shape != self.pixels.shape:
+            raise InputError(f"exact: expected a panel of {self.width}×{self.height}, got {_what(exact)}")
+        return _decibels([_difference(self.pixels, exact.pixels)])
+
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write an image file; png and webp are lossless, others blur neighbouring views into each other."""
         return write_image(path, self.pixels)
+
+
+def _difference(picture: NDArray[np.uint8], exact: NDArray[np.uint8]) -> float:
+    """Mean squared difference of two pictures, a row at a time: no copies of the size of a picture."""
+    rows = (np.square(a.astype(np.int32) - b).sum(dtype=np.int64) for a, b in zip(picture, exact, strict=True))
+    return float(sum(rows)) / picture.size
+
+
+def _decibels(differences: list[float]) -> float:
+    """Peak signal-to-noise ratio of the mean of these."""
+    mean = float(np.mean(differences))
+    return float("inf") if mean == 0 else float(10 * np.log10(255.0**2 / mean))
+
+
+def _what(picture: object) -> str:
+    """A picture, or what is none, in words."""
+    if isinstance(picture, ViewStack):
+        return f"{picture.views} views of {picture.width}×{picture.height}"
+    if isinstance(picture, Panel):
+        return f"a panel of {picture.width}×{picture.height}"
+    return type(picture).__name__

@@ -25,7 +25,7 @@ def check_memory(need: int, what: str) -> None:
     """Raise MemoryLimitError when `need` bytes are more than the machine has free."""
     free = available_memory()
     if free is not None and need > 0.9 * free:
-        raise MemoryLimitError(f"{what} would take {need / 1e9:.1f} GB of memory, and {free / 1e9:.1f} GB are free")
+        raise MemoryLimitError(f"{what} would take {need / 1e9:.3g} GB of memory, and {free / 1e9:.3g} GB are free")
 
 
 def available_memory() -> int | None:

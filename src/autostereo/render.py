@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import methods
+from .cameras import check_arguments, check_in_view, culling_range, make_camera
 from .display.display import Display
 from .display.optics import wanted_phase
 from .display.rig import Rig
 from .encoders.rgbd import disparity_map, wowvx
 from .encoders.stereo import pack
-from .engines.engine import Camera, Draw, Target, get_engine
+from .engines.engine import Draw, Target, get_engine
 from .engines.options import Options
 from .errors import InputError, UnsupportedError
 from .frame import Panel, ViewStack
@@ -25,8 +26,6 @@ from .scene.scene import Scene
 from .scene.transfer import TransferFunction
 from .scene.volume import Volume
 
-MAX_SIDE = 65536
-MAX_VIEWS = 4096
 FARTHEST = 1e30  # of a camera's offset, as in Rig
 
 
@@ -109,11 +108,9 @@ class Renderer:
         size = (display.width, display.height)
         camera = make_camera(rig, size)
         check_in_view(self.scene, rig)
-        target = Target(self._array("panel", out, (size[1], size[0], 3), np.uint8))
-        offsets = rig.camera_offsets
         draw = Draw(
             camera,
-            offsets,
+            rig.camera_offsets,
             culling_range(rig, display),
             display.viewmap,
             display.flip_x,
@@ -121,6 +118,9 @@ class Renderer:
             options,
             method,
         )
+        shape = (size[1], size[0], 3)
+        self._check_room({"panel": shape}, out, schedule.beside(self.engine, self._prepared, draw))
+        target = Target(self._array("panel", out, shape, np.uint8))
         schedule.draw_panel(self.engine, self._prepared, draw, target)
         return Panel(target.color, share(target, options))
 
@@ -129,6 +129,13 @@ class Renderer:
         options: Options | None = None, out: NDArray[np.uint8] | None = None,
     ) -> ViewStack:
         """Render a stack of views; `out` (V, H, W, 4) uint8 may be given to hold it. See `render_views`."""
+        return self._render_views(rig, size, method, options, out)
+
+    def _render_views(
+        self, rig: Rig, size: tuple[int, int], method: str, options: Options | None, out: NDArray[np.uint8] | None,
+        packed: int = 0,
+    ) -> ViewStack:
+        """A stack of views, of which pictures of `packed` bytes are to be made."""
         check_arguments(rig, options)
         if rig is None:
             raise InputError("rig: expected a Rig, got None")
@@ -138,10 +145,14 @@ class Renderer:
         check_in_view(self.scene, rig)
         offsets = rig.camera_offsets
         shape = (len(offsets), camera.height, camera.width)
+        draw = Draw(camera, offsets, culling_range(rig), options=options, method=method)
+        held = (self.engine, self._prepared, draw)
+        beside = depth_of_field.beside(schedule, *held) if options.aperture else schedule.beside(*held)
+        arrays = {"views": (*shape, 4)} | ({"depth": shape} if options.depth else {})
+        self._check_room(arrays, out, beside + packed)
         target = Target(self._array("views", out, (*shape, 4), np.uint8))
         if options.depth:
             target.depth = self._array("depth", None, shape, np.float32)
-        draw = Draw(camera, offsets, culling_range(rig), options=options, method=method)
         if options.aperture:
             depth_of_field.draw_views(schedule, self.engine, self._prepared, draw, target)
         else:
@@ -184,6 +195,15 @@ class Renderer:
         self._prepared = self.engine.update(self._prepared, scene)
         self.scene = scene
 
+    def _check_room(self, arrays: Mapping[str, tuple[int, ...]], out: Any, beside: int) -> None:
+        """Raise MemoryLimitError unless there is room for all that a frame needs and is not held yet, at once."""
+        need = beside
+        for name, shape in arrays.items():
+            held = self._held.get(name)
+            if (held is None or held.shape != shape) and (out is None or name == "depth"):
+                need += int(np.prod([int(n) for n in shape])) * (4 if name == "depth" else 1)
+        check_memory(need, describe(next(iter(arrays.values()))))
+
     def _array(self, name: str, out: Any, shape: tuple[int, ...], dtype: type) -> NDArray[Any]:
         """The array to draw into: the caller's, or one kept from frame to frame."""
         if out is not None:
@@ -193,7 +213,6 @@ class Renderer:
             return out
         held = self._held.get(name)
         if held is None or held.shape != shape:
-            check_memory(int(np.prod([int(n) for n in shape])) * np.dtype(dtype).itemsize, describe(shape))
             self._held.pop(name, None)
             held = self._held[name] = aligned_empty(shape, dtype)
         return held
@@ -204,7 +223,7 @@ class Renderer:
         """Pictures for displays without a mask: packed views, anaglyph, 2D + depth."""
         rig = replace(rig, aspect=rig.aspect or display.aspect)
         options = replace(options, depth=display.layout == "rgbd")
-        stack = self.render_views(rig, display.view_size, method=method, options=options)
+        stack = self._render_views(rig, display.view_size, method, options, None, 3 * display.width * display.height)
         if display.layout == "rgbd":
             assert stack.depth is not None
             scale = make_camera(rig, display.view_size).fx * rig.baseline / 8  # as adjacent views of a panel of 9
@@ -321,59 +340,6 @@ def observe(
     return look(
         panel.pixels, display.viewmap, wanted, crosstalk=crosstalk, flips=(display.flip_x, display.flip_y)
     )
-
-
-def check_arguments(rig: Any, options: Any) -> None:
-    """Raise InputError unless these are a Rig of a sane number of views and Options, or None."""
-    if rig is not None and not isinstance(rig, Rig):
-        raise InputError(f"rig: expected a Rig, got {type(rig).__name__}")
-    if rig is not None and rig.views > MAX_VIEWS:
-        raise InputError(f"rig views: expected at most {MAX_VIEWS}, got {rig.views}")
-    if options is not None and not isinstance(options, Options):
-        raise InputError(f"options: expected Options(…), got {type(options).__name__}")
-
-
-def make_camera(rig: Rig, size: tuple[int, int]) -> Camera:
-    """The centre camera of a rig for pictures of `size` = (width, height)."""
-    width, height = check_size(size)
-    half = np.tan(np.deg2rad(rig.fov_y) / 2)
-    fy = height / 2 / half
-    aspect = rig.aspect if rig.aspect is not None else width / height
-    fx = width / 2 / (aspect * half)
-    return Camera(rig.eye_from_world, float(fx), float(fy), width, height, rig.focal, rig.near_depth, rig.offset_y)
-
-
-def check_size(size: Any) -> tuple[int, int]:
-    """Return (width, height) as whole numbers within limits, or raise InputError."""
-    try:
-        width, height = size
-    except (TypeError, ValueError):
-        raise InputError(f"size: expected (width, height), got {size!r}") from None
-    for number in (width, height):
-        if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or not 1 <= number <= MAX_SIDE:
-            raise InputError(f"size: expected whole numbers 1…{MAX_SIDE}, got {width!r}×{height!r}")
-    return int(width), int(height)
-
-
-def culling_range(rig: Rig, display: Display | None = None) -> tuple[float, float]:
-    """Least and greatest camera offset that a draw may use; a continuous panel reaches half a view beyond the ends."""
-    if display is not None and display.continuous:
-        low, high = rig.offset_at(np.array([-0.5, rig.views - 0.5]))
-        return float(low), float(high)
-    offsets = rig.camera_offsets
-    return float(offsets[0]), float(offsets[-1])
-
-
-def check_in_view(scene: Scene, rig: Rig) -> None:
-    """Raise InputError when the whole scene lies behind the cameras."""
-    bounds = scene.bounds
-    corners = np.array([[bounds[i, 0], bounds[j, 1], bounds[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
-    depth = corners @ rig.eye_from_world[2, :3] + rig.eye_from_world[2, 3]
-    if depth.max() < rig.near_depth:
-        raise InputError(
-            f"rig: the scene lies behind the cameras (its farthest point is at depth {depth.max():.4g}, "
-            f"the near plane at {rig.near_depth:.4g}); move `position` or turn `target`"
-        )
 
 
 def share(target: Target, options: Options) -> float | None:

@@ -11,6 +11,7 @@ import typer
 from ..errors import InputError
 from . import common
 from .common import say
+from .reuse import note_reuse
 
 if TYPE_CHECKING:
     from ..display.display import Display
@@ -86,6 +87,8 @@ def quilt(
     common.announce_compilation(engine, *kernels_for(scene, None, options, method, rig.views))
     with common.working(f"rendering {rig.views} views"):
         stack = render_views(scene, rig, layout.tile, method=method, engine=engine, options=options)
+    size = layout.tile
+    note_reuse(stack, options, lambda own: render_views(scene, rig, size, method=method, engine=engine, options=own))
     with common.working("writing"):
         save_quilt(path, stack, layout)
     say(f"{path}  {layout.width}×{layout.height}")

@@ -8,6 +8,7 @@ from time import perf_counter
 
 from . import common
 from .common import note, say
+from .reuse import note_reuse
 
 
 def render(
@@ -79,8 +80,7 @@ def render(
     with common.working("rendering"):
         panel = draw(scene, where, rig, method=method, engine=engine, options=options)
     note(f"rendered in {perf_counter() - start:.2f} s")
-    if panel.reused is not None:
-        note(f"{panel.reused:.0%} of the samples have a nearby view's colour")
+    note_reuse(panel, options, lambda exact: draw(scene, where, rig, method=method, engine=engine, options=exact))
     with common.working("writing"):
         panel.save(path)
     say(f"{path}  {panel.width}×{panel.height}")

@@ -11,6 +11,7 @@ import typer
 from ..errors import DependencyError, InputError
 from . import common
 from .common import say
+from .reuse import note_reuse
 
 if TYPE_CHECKING:
     from ..display.rig import Rig
@@ -102,6 +103,7 @@ def views(
     common.announce_compilation(engine, *kernels_for(scene, None, options, method, rig.views))
     with common.working(f"rendering {rig.views} views"):
         stack = render_views(scene, rig, pixels, method=method, engine=engine, options=options)
+    note_reuse(stack, options, lambda own: render_views(scene, rig, pixels, method=method, engine=engine, options=own))
     write_views(output, stack, rig)
 
 

@@ -71,6 +71,11 @@ class Draw:
     options: Options = field(default_factory=Options)
     method: str = "single-pass"
 
+    @property
+    def pixels(self) -> int:
+        """Pixels of one view, or of the panel."""
+        return self.camera.width * self.camera.height
+
 
 @dataclass(eq=False)
 class Target:
@@ -111,6 +116,9 @@ class Engine(Protocol):
 
     def draw(self, prepared: Any, draw: Draw, target: Target) -> None:
         """Fill `target`."""
+
+    def beside(self, prepared: Any, draw: Draw) -> int:
+        """Bytes of the pictures that a draw holds beside its target, in main memory."""
 
     def interlace(self, views: NDArray[np.uint8], draw: Draw, out: NDArray[np.uint8]) -> None:
         """Gather out[r, x, c] from views (V, H, W, 4) by `draw.viewmap`, with flips; u is rounded to a view."""

@@ -36,6 +36,11 @@ def by_channel(draw_panel: DrawPanel) -> DrawPanel:
     return draw
 
 
+def held_by_channel(draw: Draw) -> int:
+    """Bytes of the panel that `by_channel` holds beside the target."""
+    return 0 if draw.options.sampling == "pixel" else 3 * draw.pixels
+
+
 def of_channel(draw: Draw, channel: int) -> Draw:
     """The draw whose pixels are sampled where channel 0, 1 or 2 of a panel's pixels lies."""
     camera = replace(draw.camera, shift=((1 - channel) * THIRD, 0.0), spread=THIRD)

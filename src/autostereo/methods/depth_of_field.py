@@ -11,25 +11,45 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..engines.engine import Draw, Engine, Target
+
+
+def beside(schedule: ModuleType, engine: Engine, prepared: Any, draw: Draw) -> int:
+    """Bytes of the pictures held beside the target: a row of the lens, its sum and that of all rows."""
+    group = 4 * draw.options.lens[0] * draw.pixels
+    return group + 2 * 16 * draw.pixels + int(schedule.beside(engine, prepared, lens_draw(draw, 0, 0.0)))
 
 
 def draw_views(schedule: ModuleType, engine: Engine, prepared: Any, draw: Draw, target: Target) -> None:
     """Draw all views by `schedule`, through the lens that the options give. The target has no depth."""
     columns, rows = draw.options.lens
-    across, up = (draw.options.aperture * ((np.arange(n) + 0.5) / n - 0.5) for n in (columns, rows))
-    low, high = draw.culling
-    culling = (low + across[0], high + across[-1])
     _, height, width, _ = target.color.shape
     group = Target(np.empty((columns, height, width, 4), np.uint8))
-    count = columns * rows
-    for i, offset in enumerate(draw.offsets):
-        total = np.zeros((height, width, 4), np.uint32)
-        for y in up:
-            camera = replace(draw.camera, offset_y=draw.camera.offset_y + float(y))
-            lens_draw = replace(draw, camera=camera, offsets=offset + across, culling=culling)
-            schedule.draw_views(engine, prepared, lens_draw, group)
+    total, count = np.empty((height, width, 4), np.uint32), columns * rows
+    for i in range(len(draw.offsets)):
+        total[...] = 0
+        for y in places(draw, rows):
+            schedule.draw_views(engine, prepared, lens_draw(draw, i, float(y)), group)
             total += group.color.sum(axis=0, dtype=np.uint32)
-        target.color[i] = (total + count // 2) // count
+        total += count // 2
+        total //= count
+        target.color[i] = total
     target.covered, target.reused = group.covered, group.reused
+
+
+def lens_draw(draw: Draw, view: int, y: float) -> Draw:
+    """The draw of a row of the lens of a view, at height y."""
+    across, (low, high) = places(draw, draw.options.lens[0]), draw.culling
+    return replace(
+        draw,
+        camera=replace(draw.camera, offset_y=draw.camera.offset_y + y),
+        offsets=draw.offsets[view] + across,
+        culling=(low + across[0], high + across[-1]),
+    )
+
+
+def places(draw: Draw, count: int) -> NDArray[np.float64]:
+    """Offsets (count,) of a row or column of cameras from the lens's middle."""
+    return np.asarray(draw.options.aperture * ((np.arange(count) + 0.5) / count - 0.5))

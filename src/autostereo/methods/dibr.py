@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..engines.engine import Draw, Engine, Target
-from .by_channel import by_channel
+from .by_channel import by_channel, held_by_channel
 
 
 def reference_views(views: int, count: int) -> NDArray[np.int64]:
@@ -22,6 +22,13 @@ def reference_views(views: int, count: int) -> NDArray[np.int64]:
     if count == 1:
         return np.array([(views - 1) // 2])
     return np.unique(np.rint(np.linspace(0, views - 1, min(count, views))).astype(np.int64))
+
+
+def beside(engine: Engine, prepared: Any, draw: Draw) -> int:
+    """Bytes of the pictures held beside the target."""
+    wanted = reference_draw(draw)
+    own = 0 if draw.viewmap is None else held_by_channel(draw) + 4 * draw.pixels
+    return own + 8 * draw.pixels * len(wanted.offsets) + engine.beside(prepared, wanted)
 
 
 def draw_views(engine: Engine, prepared: Any, draw: Draw, target: Target) -> None:
@@ -48,10 +55,15 @@ def draw_panel(engine: Engine, prepared: Any, draw: Draw, target: Target) -> Non
 
 def draw_references(engine: Engine, prepared: Any, draw: Draw) -> tuple[Target, NDArray[np.float64]]:
     """Pictures with depths of the reference views, in one pass, and their offsets (R,)."""
-    offsets = draw.offsets[reference_views(len(draw.offsets), draw.options.references)]
-    shape = len(offsets), draw.camera.height, draw.camera.width
+    wanted = reference_draw(draw)
+    shape = len(wanted.offsets), draw.camera.height, draw.camera.width
     references = Target(np.empty((*shape, 4), np.uint8), np.empty(shape, np.float32))
-    options = replace(draw.options, aperture=0.0, depth=True)  # the samples of a lens are views by now
-    wanted = replace(draw, offsets=offsets, viewmap=None, options=options, method="single-pass")
     engine.draw(prepared, wanted, references)
-    return references, offsets
+    return references, wanted.offsets
+
+
+def reference_draw(draw: Draw) -> Draw:
+    """The draw of the reference views, with depths."""
+    offsets = draw.offsets[reference_views(len(draw.offsets), draw.options.references)]
+    options = replace(draw.options, aperture=0.0, depth=True)  # the samples of a lens are views by now
+    return replace(draw, offsets=offsets, viewmap=None, options=options, method="single-pass")

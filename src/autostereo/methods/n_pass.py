@@ -8,7 +8,14 @@ from typing import Any
 import numpy as np
 
 from ..engines.engine import Draw, Engine, Target
-from .by_channel import by_channel
+from .by_channel import by_channel, held_by_channel
+
+
+def beside(engine: Engine, prepared: Any, draw: Draw) -> int:
+    """Bytes of the pictures held beside the target."""
+    one = replace(draw, offsets=draw.offsets[:1], viewmap=None)
+    own = 0 if draw.viewmap is None else held_by_channel(draw) + 4 * draw.pixels
+    return own + engine.beside(prepared, one)
 
 
 def draw_views(engine: Engine, prepared: Any, draw: Draw, target: Target) -> None:

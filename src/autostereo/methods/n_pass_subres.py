@@ -14,7 +14,16 @@ from ..engines.engine import Draw, Engine, Target
 from ..errors import UnsupportedError
 from ..frame import ViewStack
 from . import n_pass
-from .by_channel import by_channel
+from .by_channel import by_channel, held_by_channel
+
+
+def beside(engine: Engine, prepared: Any, draw: Draw) -> int:
+    """Bytes of the pictures held beside the target: small views, and the quilt that they are woven from."""
+    small = small_draw(draw)
+    columns, rows = quilt_grid(len(draw.offsets))
+    one = replace(small, offsets=draw.offsets[:1])
+    pictures = 4 * small.pixels * (len(draw.offsets) + columns * rows)
+    return held_by_channel(draw) + pictures + engine.beside(prepared, one)
 
 
 def draw_views(engine: Engine, prepared: Any, draw: Draw, target: Target) -> None:
@@ -25,23 +34,32 @@ def draw_views(engine: Engine, prepared: Any, draw: Draw, target: Target) -> Non
 @by_channel
 def draw_panel(engine: Engine, prepared: Any, draw: Draw, target: Target) -> None:
     """Draw V small views one after the other and weave them into the panel, bilinearly."""
-    assert draw.viewmap is not None
-    height, width, _ = target.color.shape
-    views = len(draw.offsets)
-    small_width, small_height = max(1, round(width / views**0.5)), max(1, round(height / views**0.5))
-    camera = replace(
-        draw.camera,
-        width=small_width,
-        height=small_height,
-        fx=draw.camera.fx * small_width / width,
-        fy=draw.camera.fy * small_height / height,
-        shift=(draw.camera.shift[0] * small_width / width, 0.0),
+    small = small_draw(draw)
+    stack = Target(np.empty((len(draw.offsets), small.camera.height, small.camera.width, 4), np.uint8))
+    n_pass.draw_views(engine, prepared, small, stack)
+    columns, rows = quilt_grid(len(draw.offsets))
+    quilt = ViewStack(stack.color).quilt(columns, rows)
+    target.color[...] = engine.weave(quilt, (columns, rows), draw, (draw.camera.width, draw.camera.height))
+    target.covered, target.reused = stack.covered, stack.reused
+
+
+def small_draw(draw: Draw) -> Draw:
+    """The draw of small views instead of a panel."""
+    camera, share = draw.camera, len(draw.offsets) ** -0.5
+    width, height = max(1, round(camera.width * share)), max(1, round(camera.height * share))
+    small = replace(
+        camera,
+        width=width,
+        height=height,
+        fx=camera.fx * width / camera.width,
+        fy=camera.fy * height / camera.height,
+        shift=(camera.shift[0] * width / camera.width, 0.0),
         spread=1.0,
     )
-    stack = Target(np.empty((views, small_height, small_width, 4), np.uint8))
-    n_pass.draw_views(engine, prepared, replace(draw, camera=camera, viewmap=None), stack)
+    return replace(draw, camera=small, viewmap=None)
+
+
+def quilt_grid(views: int) -> tuple[int, int]:
+    """Columns and rows of a quilt of so many views."""
     columns = int(np.ceil(views**0.5))
-    rows = -(-views // columns)
-    quilt = ViewStack(stack.color).quilt(columns, rows)
-    target.color[...] = engine.weave(quilt, (columns, rows), draw, (width, height))
-    target.covered, target.reused = stack.covered, stack.reused
+    return columns, -(-views // columns)

@@ -7,6 +7,11 @@ from typing import Any
 from ..engines.engine import Draw, Engine, Target
 
 
+def beside(engine: Engine, prepared: Any, draw: Draw) -> int:
+    """Bytes of the pictures held beside the target."""
+    return engine.beside(prepared, draw)
+
+
 def draw_views(engine: Engine, prepared: Any, draw: Draw, target: Target) -> None:
     """Draw the whole stack."""
     engine.draw(prepared, draw, target)

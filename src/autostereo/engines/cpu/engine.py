@@ -38,6 +38,12 @@ class Prepared:
         """The volumes of the scene."""
         return [] if self.volumes is None else self.volumes.volumes
 
+    @property
+    def several(self) -> bool:
+        """Whether one stage needs the depths of another, or several passes of one need them."""
+        opaque = self.meshes is not None or self.points is not None
+        return opaque or any(v.mode == "iso" for v in self.all_volumes)
+
 
 class CpuEngine:
     """Draws meshes, points and volumes; see engines.engine.Engine.
@@ -76,6 +82,16 @@ class CpuEngine:
             volumes=prepared.volumes if prepared.volumes is None else update_volumes(prepared.volumes, scene, volumes),
         )
 
+    def beside(self, prepared: Prepared, draw: Draw) -> int:
+        """Depths of scenes that are drawn in stages, and sums of samples; meshes alone need neither."""
+        if prepared.points is None and prepared.volumes is None:
+            return 0
+        panel = draw.viewmap is not None
+        values, samples = (3, 3) if panel else (4 * len(draw.offsets), len(draw.offsets))  # a pixel has
+        depths = int(prepared.several and (panel or not draw.options.depth))
+        means = int(draw.options.samples > 1)
+        return draw.pixels * (4 * samples * (depths + means * draw.options.depth) + 2 * values * means)
+
     def draw(self, prepared: Prepared, draw: Draw, target: Target) -> None:
         """Draw a stack of views, or straight to the panel."""
         with prepared.lock:
@@ -102,20 +118,17 @@ class CpuEngine:
             sums += target.color
             if nearest is not None and target.depth is not None:
                 np.minimum(nearest, target.depth, out=nearest)
-        target.color[...] = (sums + side * side // 2) // (side * side)
+        sums += side * side // 2  # in place: sums are twice as large as the pictures
+        sums //= side * side
+        target.color[...] = sums
         if nearest is not None and target.depth is not None:
             target.depth[...] = nearest
 
     def _draw_stages(self, prepared: Prepared, draw: Draw, target: Target) -> None:
         panel = draw.viewmap is not None
         shape = target.color.shape if panel else target.color.shape[:3]
-        several = (
-            prepared.meshes is not None
-            or prepared.points is not None
-            or any(v.mode == "iso" for v in prepared.all_volumes)
-        )
         depth = target.depth
-        if depth is None and several:
+        if depth is None and prepared.several:
             depth = prepared.memory.buffer("depth", shape, np.float32)
         if prepared.meshes is not None:
             stage = Target(target.color, depth)

@@ -127,6 +127,10 @@ class GlEngine:
             prepared.kept.forget("vertex array")  # they hold on to the buffers of stages that are replaced
             return replace(prepared, scene=scene, stages=make_stages(device, scene, prepared.middle, prepared))
 
+    def beside(self, prepared: Prepared, draw: Draw) -> int:
+        """Pictures are the device's."""
+        return 0
+
     def draw(self, prepared: Prepared, draw: Draw, target: Target) -> None:
         """Draw a stack of views, or a panel, by `draw.method`."""
         check_method(prepared.scene, draw)

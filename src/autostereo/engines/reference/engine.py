@@ -22,6 +22,8 @@ from .picture import visible_hits as visible_hits
 from .points import Surfels
 from .volume import Field
 
+SAMPLE_BYTES = 250  # of what is held for a sample of a picture
+
 Array = NDArray[np.float64]
 
 PREPARE: dict[type, Callable[[Any], Any]] = {Mesh: Surface.of, Points: Surfels.of, Volume: Field.of}
@@ -57,6 +59,10 @@ class ReferenceEngine:
     def update(self, prepared: PreparedScene, scene: Scene) -> PreparedScene:
         """Prepare the scene anew: nothing here is dear."""
         return self.prepare(scene)
+
+    def beside(self, prepared: PreparedScene, draw: Draw) -> int:
+        """Arrays over the samples of a view, or of the panel: rays, hits, colours, as measured."""
+        return SAMPLE_BYTES * draw.options.samples * draw.pixels * (1 if draw.viewmap is None else 3)
 
     def draw(self, prepared: PreparedScene, draw: Draw, target: Target) -> None:
         """Fill `target`: view by view, or the panel's sub-pixels."""

@@ -1,0 +1,96 @@
+"""A frame is refused for all the memory that it takes, not array by array."""
+
+from __future__ import annotations
+
+import importlib
+import tracemalloc
+
+import numpy as np
+import pytest
+
+import autostereo as aus
+from autostereo import Renderer
+from autostereo.scene.samples import surfel_cloud
+
+DOOR = importlib.import_module("autostereo.render")  # the module: the package gives the function of that name
+RIG = aus.Rig(position=(0, 0, 4), fov_y=40, baseline=1.2, views=12, near=0.2)
+SIZE = (640, 480)
+TABLE = aus.Display.slanted(*SIZE, 12, lens_pitch=5.7, subpixel_pitch=1.0, slant_deg=9.46)
+PICTURE = 4 * SIZE[0] * SIZE[1]
+SMALL = 3_000_000  # bytes of what is no picture: bands of rows, triangles, offsets
+
+
+def triangle() -> aus.Scene:
+    """A triangle, which hardly takes memory itself."""
+    return aus.Scene(aus.Mesh([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], [[0, 1, 2]]))
+
+
+def mixed() -> aus.Scene:
+    """The triangle and some surfels: drawn in stages."""
+    return aus.Scene([*triangle().objects, surfel_cloud(100)])
+
+
+def frame(scene: aus.Scene, what: str, method: str, engine: str, **options: object) -> None:
+    """A frame of a fresh renderer."""
+    given = aus.Options(**options)  # type: ignore[arg-type]
+    if what == "views":
+        Renderer(scene, engine).render_views(RIG, SIZE, method=method, options=given)
+    else:
+        display = {"panel": TABLE, "packed": aus.Display.stereo(*SIZE, layout="row-interleaved")}[what]
+        Renderer(scene, engine).render(display, RIG, method=method, options=given)
+
+
+CASES = {
+    "views": (triangle, "views", "single-pass", {}),
+    "views with depth": (triangle, "views", "single-pass", {"depth": True}),
+    "views in stages": (mixed, "views", "single-pass", {}),
+    "views in stages, with depth, samples": (mixed, "views", "single-pass", {"depth": True, "samples": 4}),
+    "views in stages, samples": (mixed, "views", "single-pass", {"samples": 4}),
+    "n passes": (mixed, "views", "n-pass", {"depth": True}),
+    "warped": (triangle, "views", "dibr", {"references": 5}),
+    "warped in stages": (mixed, "views", "dibr", {"references": 5, "samples": 4}),
+    "through a lens": (triangle, "views", "single-pass", {"aperture": 0.1, "lens": (6, 2)}),
+    "through a lens, warped": (mixed, "views", "dibr", {"aperture": 0.1, "lens": (6, 2), "references": 4}),
+    "panel": (triangle, "panel", "single-pass", {}),
+    "panel in stages": (mixed, "panel", "single-pass", {"samples": 4}),
+    "panel by n passes": (mixed, "panel", "n-pass", {"sampling": "subpixel"}),
+    "panel of small views": (triangle, "panel", "n-pass-subres", {}),
+    "panel of small views, sub-pixels": (mixed, "panel", "n-pass-subres", {"sampling": "subpixel"}),
+    "panel, warped": (triangle, "panel", "dibr", {"references": 7}),
+    "packed": (triangle, "packed", "single-pass", {}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_what_is_asked_for_is_what_is_taken(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    make, what, method, options = CASES[name]
+    scene, asked = make(), []
+    frame(scene, what, method, "cpu", **options)  # compiles
+    monkeypatch.setattr(DOOR, "check_memory", lambda need, what: asked.append(need))
+    tracemalloc.start()
+    try:
+        frame(scene, what, method, "cpu", **options)
+        taken = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert taken - SMALL <= asked[0] <= 1.15 * taken + PICTURE // 2
+
+
+def test_parts_that_fit_one_by_one_are_refused_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    views = RIG.views * PICTURE
+    monkeypatch.setattr("autostereo.memory.available_memory", lambda: int(1.5 * views))
+    frame(triangle(), "views", "single-pass", "cpu")
+    for options in ({"depth": True}, {"aperture": 0.1, "lens": (8, 1)}):
+        with pytest.raises(aus.MemoryLimitError, match=r"12 views of 640×480 pixels would take 0\.0\d+ GB"):
+            frame(triangle(), "views", "single-pass", "cpu", **options)
+    with pytest.raises(aus.MemoryLimitError, match="12 views of 640×480"):
+        frame(triangle(), "views", "dibr", "cpu", references=8)
+
+
+def test_what_is_held_already_is_not_asked_for_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    renderer, asked = Renderer(triangle(), "cpu"), []
+    monkeypatch.setattr(DOOR, "check_memory", lambda need, what: asked.append(need))
+    for _ in range(2):
+        renderer.render_views(RIG, SIZE)
+    renderer.render(TABLE, RIG, out=np.empty((SIZE[1], SIZE[0], 3), np.uint8))
+    assert asked == [RIG.views * PICTURE, 0, 0]
