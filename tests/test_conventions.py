@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -154,8 +156,11 @@ def test_reverse_turns_views_and_phase_round_and_keeps_phase_0() -> None:
     rows, columns = np.arange(4), np.arange(10)
     plain, turned = ViewMap(6, table), ViewMap(6, table, reverse=True)
     assert np.array_equal(turned.view(rows, columns), 5 - plain.view(rows, columns))
-    phase = ViewMap(4, a=0.25, offsets=np.zeros((1, 3)), reverse=True).phase(np.arange(1), np.arange(4))[0, :, 0]
-    assert np.array_equal(phase, [0.0, 0.75, 0.5, 0.25])
+    lens = ViewMap(4, a=0.25, offsets=np.zeros((1, 3)), reverse=True)  # every sub-pixel on the border of two zones
+    assert np.array_equal(lens.phase(np.arange(1), np.arange(4))[0, :, 0], [0.0, 0.75, 0.5, 0.25])
+    assert np.array_equal(lens.view(np.arange(1), np.arange(4))[0, :, 0], [3, 2, 1, 0])
+    follows = replace(lens, continuous=True).camera(np.arange(1), np.arange(4))[0, :, 0]
+    assert np.array_equal(follows, [-0.5, 2.5, 1.5, 0.5])
 
 
 def test_quilt_tile_0_is_bottom_left_then_right_then_up() -> None:

@@ -161,6 +161,8 @@ def test_every_constructor_takes_reverse_and_swapped_toggles_it(name: str) -> No
         if plain.continuous:
             phi = (phi + 0.5) / plain.views
             assert np.array_equal((reverse.view_of_subpixel() + 0.5) / plain.views, np.where(phi == 0, 0, 1 - phi))
+        else:
+            assert np.array_equal(reverse.view_of_subpixel(), plain.views - 1 - phi)
 
 
 def test_packed_layouts_have_sizes() -> None:

@@ -63,10 +63,10 @@ def test_phase_and_view_stay_in_range_and_reverse_mirrors(a: float, b: float, o:
     for p in (phi, mirrored):
         assert (p >= 0).all() and (p < 1).all()
     assert np.array_equal(mirrored, np.where((phi == 0) | (1 - phi >= 1), 0, 1 - phi))
-    for vm in (forward, backward):
-        view = vm.view(rows, columns)
-        assert view.min() >= 0 and view.max() < views
-        assert np.array_equal(view, np.floor(vm.phase(rows, columns) * views).astype(int))
+    view = forward.view(rows, columns)
+    assert view.min() >= 0 and view.max() < views
+    assert np.array_equal(view, np.floor(phi * views).astype(int))
+    assert np.array_equal(backward.view(rows, columns), views - 1 - view)
 
 
 def test_phase_follows_the_fixed_order_of_operations() -> None:

@@ -52,7 +52,7 @@ class ViewMap:
     continuous : bool
         Phase form: show camera coordinate u = φ·V − ½ instead of view ⌊φ·V⌋.
     reverse : bool
-        Zones run the other way: view V−1−i, phase 1−φ (0 stays 0).
+        Zones run the other way: view V−1−i; phase 1−φ (0 stays 0), and what is continuous follows the phase.
 
     Notes
     -----
@@ -116,23 +116,29 @@ class ViewMap:
         """Phase φ ∈ [0, 1) of pixels, reversed if the map is; shape (R, C, 3) for rows (R,) and columns (C,)."""
         if self.offsets is None:
             raise InputError("view map: a table has no phase")
+        phi = self._forward_phase(rows, columns)
+        if self.reverse:
+            phi = np.where(phi == 0.0, 0.0, 1.0 - phi)
+        return np.where(phi >= 1.0, 0.0, phi)  # 1 − 1e-17 rounds to 1
+
+    def _forward_phase(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Phase before it is reversed, shape (R, C, 3)."""
+        assert self.offsets is not None
         r = np.asarray(rows)[:, None]
         x = np.asarray(columns)[None, :]
         cell = cell_index(self.cell_mode, x, self.height - 1 - r) % len(self.offsets)
         t = (self.a * x + self.b * r)[..., None] + self.offsets[cell]
         phi = t - np.floor(t)
-        if self.reverse:
-            phi = np.where(phi == 0.0, 0.0, 1.0 - phi)
-        return np.where(phi >= 1.0, 0.0, phi)  # 1 − 1e-17 rounds to 1
+        return np.where(phi >= 1.0, 0.0, phi)
 
     def view(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.int32]:
         """View index of each sub-pixel, shape (R, C, 3), int32."""
         if self.table is not None:
             h, w, _ = self.table.shape
             view = self.table[np.asarray(rows)[:, None] % h, np.asarray(columns)[None, :] % w]
-            return (self.views - 1 - view if self.reverse else view).astype(np.int32)
-        view = np.floor(self.phase(rows, columns) * self.views).astype(np.int32)
-        return np.minimum(view, self.views - 1)
+        else:
+            view = np.minimum(np.floor(self._forward_phase(rows, columns) * self.views), self.views - 1)
+        return (self.views - 1 - view if self.reverse else view).astype(np.int32)
 
     def camera(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.float64]:
         """Camera coordinate u of each sub-pixel, shape (R, C, 3), float64: u = i at camera i."""

@@ -133,14 +133,15 @@ def row_offsets(row, width, flip, columns, base, x0, plane, plan, u, out):
             x = turn + sign * np.int64(i)
             t = (a * np.float64(x) + br) + (odd if x & 1 else even)
             phi = t - np.floor(t)
-            phi = 1.0 - phi if reverse else phi
+            phi = 1.0 - phi if reverse and m.continuous else phi
             u[i] = (phi if phi < 1.0 else 0.0) * views
         if spacing != 0.0 and m.continuous:
             for i in range(count):
                 out[begin + i] = np.float32(((u[i] - 0.5) - middle) * spacing)
         elif spacing != 0.0:
             for i in range(count):
-                out[begin + i] = np.float32((min(np.floor(u[i]), views - 1.0) - middle) * spacing)
+                view = min(np.floor(u[i]), views - 1.0)
+                out[begin + i] = np.float32(((views - 1.0 - view if reverse else view) - middle) * spacing)
         elif m.continuous:
             top, following = np.float64(max(last - 1, 0)), np.int64(min(last, 1))
             for i in range(count):
@@ -150,7 +151,8 @@ def row_offsets(row, width, flip, columns, base, x0, plane, plan, u, out):
                 out[begin + i] = np.float32(low + (at - k) * (high - low))
         else:
             for i in range(count):
-                out[begin + i] = np.float32(offsets[np.uint64(np.int64(min(np.floor(u[i]), views - 1.0)))])
+                view = np.int64(min(np.floor(u[i]), views - 1.0))
+                out[begin + i] = np.float32(offsets[np.uint64(last - view if reverse else view)])
 
 
 @inlined

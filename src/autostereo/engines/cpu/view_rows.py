@@ -123,14 +123,16 @@ def row_camera(r, width, table, a, b, offsets, cell_mode, height, views, continu
     if table.shape[0] > 0:
         _table_views(table[r % table.shape[0]], views, reverse, out)
         return
-    row_phase(r, width, table, a, b, offsets, cell_mode, height, views, continuous, reverse, out)
+    turned = reverse and continuous  # views are counted before they are reversed: phases on their borders, too
+    row_phase(r, width, table, a, b, offsets, cell_mode, height, views, continuous, turned, out)
     flat = out.reshape(-1)
     if continuous:
         for i in range(3 * width):
             flat[i] = flat[i] * views - 0.5
     else:
         for i in range(3 * width):
-            flat[i] = min(np.floor(flat[i] * views), views - 1.0)
+            view = min(np.floor(flat[i] * views), views - 1.0)
+            flat[i] = views - 1.0 - view if reverse else view
 
 
 class Steps(NamedTuple):
@@ -174,11 +176,13 @@ def _certain_views(r, m, steps, out):
     doubt = (2.0 + (abs(br) + steps.far) * (TURN * 2.0**-50)) * m.views
     if not doubt < MOST_DOUBT:
         return False
+    turned, mirrored, last = m.reverse and m.continuous, m.reverse and not m.continuous, np.int32(m.views - 1)
     turns, near, start, doubtful = steps.turns, np.uint64(2 * int(doubt)), to_turns(br), np.uint64(0)
     for i in range(out.shape[0]):
         turn = (turns[i] + start) & LOW_HALF
-        place = ((WHOLE_TURN - turn) & LOW_HALF if m.reverse else turn) * views
-        out[i] = np.int32(place >> np.uint64(32))
+        place = ((WHOLE_TURN - turn) & LOW_HALF if turned else turn) * views
+        view = np.int32(place >> np.uint64(32))
+        out[i] = last - view if mirrored else view
         doubtful |= np.uint64(((place + np.uint64(int(doubt))) & LOW_HALF) < near)
     return doubtful == np.uint64(0)
 
@@ -187,15 +191,17 @@ def _certain_views(r, m, steps, out):
 def _phase_views(r, m, steps, out):
     """`row_views` of a plain phase map in one loop, in the order of operations of `row_camera`; vectorised."""
     along, offset = steps.along, steps.offset
-    br, views, most, reverse = m.b * r, m.views, m.views - 1.0, m.reverse
+    br, views, most = m.b * r, m.views, m.views - 1.0
+    turned, mirrored, last = m.reverse and m.continuous, m.reverse and not m.continuous, np.int32(m.views - 1)
     least = 0.5 if m.continuous else 0.0
     for i in range(out.shape[0]):
         t = along[i] + br + offset[i]
         phi = t - np.floor(t)
-        if reverse:
+        if turned:
             phi = 1.0 - phi
         phi = phi if phi < 1.0 else 0.0
-        out[i] = np.int32(min(phi * views - least + least, most))
+        view = np.int32(min(phi * views - least + least, most))
+        out[i] = last - view if mirrored else view
 
 
 @kernel

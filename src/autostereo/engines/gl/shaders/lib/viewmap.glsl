@@ -43,8 +43,8 @@ dvec3 phases(int x, int r) {
     precise double down = phase_step.y * double(r);
     precise dvec3 t = (along + down) + o;
     precise dvec3 phi = t - floor(t);
-#ifdef REVERSE
-    phi = 1.0LF - phi;
+#if defined(REVERSE) && defined(CONTINUOUS)
+    phi = 1.0LF - phi;  // else views are counted before they are reversed
 #endif
     return mix(phi, dvec3(0.0LF), greaterThanEqual(phi, dvec3(1.0LF)));  // 1 - 1e-17 rounds to 1
 }
@@ -55,14 +55,14 @@ ivec3 view_indices(int x, int r) {
 #ifdef VIEWMAP_TABLE
     ivec2 size = textureSize(view_table, 0);
     ivec3 view = ivec3(texelFetch(view_table, ivec2(x % size.x, r % size.y), 0).rgb);
+#else
+    precise dvec3 u = phases(x, r) * double(view_count);
+    ivec3 view = min(ivec3(floor(u)), view_count - 1);
+#endif
 #ifdef REVERSE
     view = view_count - 1 - view;
 #endif
     return view;
-#else
-    precise dvec3 u = phases(x, r) * double(view_count);
-    return min(ivec3(floor(u)), view_count - 1);
-#endif
 }
 
 // Camera coordinates u of the three sub-pixels; whole numbers on panels that are not continuous.
