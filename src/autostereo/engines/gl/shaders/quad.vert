@@ -89,5 +89,7 @@ void main() {
     first_pixel = ivec2(views[tile].yz);
     vec2 corner = vec2((gl_VertexID & 1) == 0 ? low.x : high.x, (gl_VertexID & 2) == 0 ? low.y : high.y);
     float nearest = max(min(min(p[0].z, p[1].z), p[2].z), near);
-    gl_Position = vec4(2.0 * (corner + views[tile].yz) / atlas_size.xy - 1.0, 2.0 * window_from_depth(nearest) - 1.0, 1.0);
+    // quad.frag promises depths behind this one: a little nearer, as depths of rays round
+    float front = max(window_from_depth(nearest) - 1e-6 * depth_range.x / depth_range.y, 0.0);
+    gl_Position = vec4(2.0 * (corner + views[tile].yz) / atlas_size.xy - 1.0, 2.0 * front - 1.0, 1.0);
 }
