@@ -18,7 +18,9 @@ import autostereo as aus
 from autostereo.engines import constants
 from autostereo.engines.gl import context, programs
 from autostereo.engines.gl.atlas import MAX_PIXELS, Layout
+from autostereo.engines.gl.engine import METHODS
 from autostereo.engines.gl.job import read_by
+from autostereo.scene.samples import shells, surfel_cloud
 from gl_device import need_device
 
 SCENE = aus.Scene(aus.Mesh([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], [[0, 1, 2]]))
@@ -55,15 +57,39 @@ def live_objects() -> dict[str, int]:
     return dict(Counter(type(item).__name__ for item in found))
 
 
-@pytest.mark.parametrize("method", ["single-pass", "n-pass-masked"])
-def test_a_renderer_leaves_nothing_behind(method):
+def textured() -> aus.Mesh:
+    """A triangle with a picture on it."""
+    return replace(SCENE.objects[0], uv=[(0, 0), (1, 0), (0, 1)], texture=np.full((4, 4, 3), 99, np.uint8))
+
+
+def isosurface() -> aus.Volume:
+    """A volume of another mode than that of `shells`."""
+    return replace(shells(16), mode="iso", iso=0.5)
+
+
+KINDS = {
+    "mesh": lambda: SCENE,
+    "texture": lambda: aus.Scene(textured()),
+    "points": lambda: aus.Scene(surfel_cloud(200)),
+    "volume": lambda: aus.Scene(shells(16)),
+    "mixed": lambda: aus.Scene([textured(), surfel_cloud(200), isosurface(), shells(16)]),
+}
+LEFT = [
+    *((kind, "single-pass") for kind in KINDS), *((kind, "n-pass-masked") for kind in KINDS),
+    *((kind, "covering-quad") for kind in KINDS), ("mixed", "n-pass-subres"), ("mixed", "dibr"),
+    *(("texture", method) for method in METHODS[aus.Mesh]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "method"), LEFT)
+def test_a_renderer_leaves_nothing_behind(kind, method):
     """Not even one that is let go of on another thread; and without the help of Python's cycle collector."""
     need_device()
-    display = aus.Display.wavelength_selective(32, 24)
+    display, scene = aus.Display.wavelength_selective(32, 24), KINDS[kind]()
 
     def render_and_forget() -> None:
-        for options in (aus.Options(), aus.Options(samples=4, sampling="subpixel")):
-            renderer = aus.Renderer(SCENE, "gl")
+        for options in (aus.Options(), aus.Options(samples=4, sampling="subpixel"), aus.Options(alpha="averaged")):
+            renderer = aus.Renderer(scene, "gl")
             renderer.render(display, method=method, options=options)
             renderer.render_views(RIG, (32, 24))
 

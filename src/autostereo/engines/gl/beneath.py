@@ -7,6 +7,7 @@ from typing import Any
 from .context import Device
 from .job import Job
 from .panel import Panel
+from .programs import put_textures
 
 
 class Beneath:
@@ -55,10 +56,4 @@ class Beneath:
 
     def use(self, program: Any, color_unit: int, depth_unit: int) -> None:
         """Give them to a program that includes lib/volume_target.glsl."""
-        for name, texture, unit in (
-            ("color_before", self._color, color_unit),
-            ("depth_before", self._depth, depth_unit),
-        ):
-            if name in program:
-                texture.use(unit)
-                program[name] = unit
+        put_textures(program, color_before=(self._color, color_unit), depth_before=(self._depth, depth_unit))

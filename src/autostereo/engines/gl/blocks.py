@@ -18,7 +18,7 @@ from ...viewmap import ViewMap
 from ..constants import ATLAS_VIEWS, LEVELS, MAX_CAMERAS, MAX_CELLS
 from ..engine import Camera
 from .context import Device
-from .programs import Defines
+from .programs import Defines, put
 
 BINDINGS = {"Frame": 0, "Views": 1, "ViewMap": 2, "Cameras": 3}  # the uniform blocks of shaders/lib; others from 4 on
 MASK_UNIT = 15  # texture unit of a mask's table
@@ -142,6 +142,4 @@ class Mask:
             self._held.bind_to_uniform_block(BINDINGS["ViewMap"])
             return
         self._held.use(MASK_UNIT)
-        for name, value in (("view_table", MASK_UNIT), ("view_count", self.viewmap.views)):
-            if name in program:
-                program[name] = value
+        put(program, view_table=MASK_UNIT, view_count=self.viewmap.views)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .programs import Programs
 
 VERSIONS = (460, 450, 440, 430, 420, 410, 400, 330)  # asked for in turn; 330 so that a refusal can name what is there
+COMPUTE_VERSION = 430  # compute shaders, storage buffers
 GL_VERSION = 400  # double precision in shaders, which view maps need (lib/viewmap.glsl)
 DEBIAN_PACKAGES = "libegl1 libgl1-mesa-dri libgl1"
 SOFTWARE = ("llvmpipe", "softpipe", "swiftshader", "software rasterizer")

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from ...scene.scene import Scene
 from ..engine import Camera, Draw
+from ..reference.shading import lights_in_eye_space
 from .atlas import Atlas
 from .blocks import Blocks, DepthRange, Mask, attach, frame_block, views_block
 from .context import Device
-from .programs import Defines
+from .programs import Defines, put
 
 VIEW_PIXEL = 15e-9  # seconds of a CPU per pixel of an atlas of views, in any scene, measured on llvmpipe
 CLEARLY = 0.7  # of the expected time: estimates err
@@ -117,8 +118,7 @@ class Job:
         assert self.mask is not None
         program = self.program(*names, defines={**(defines or {}), **self.mask.defines}, version=version)
         self.mask.use(program)
-        if "flip" in program:
-            program["flip"] = self.draw.flip_x, self.draw.flip_y
+        put(program, flip=(self.draw.flip_x, self.draw.flip_y))
         return program
 
     def vertex_array(self, program: Any, content: list[Any], indices: Any = None) -> Any:
@@ -134,6 +134,12 @@ class Job:
     def cover(self, program: Any) -> None:
         """Draw one triangle that covers the target."""
         self.vertex_array(program, []).render(vertices=3)
+
+
+def put_lights(program: Any, job: Job) -> None:
+    """Give the scene's lights to a program that includes lib/shading.glsl."""
+    lights = lights_in_eye_space(job.scene.lights, job.draw.camera)
+    put(program, light_place=[place for place, _ in lights], light_color=[color for _, color in lights])
 
 
 def read_by(program: Any, buffer: Any, formats: str, *names: str) -> tuple[Any, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..constants import MEMORY_WIDTH
-from .context import Device
+from .context import COMPUTE_VERSION, Device
 from .job import Job
 
 BLANK_ROWS = 256  # that are set at once
@@ -27,7 +27,7 @@ class Memory:
         device, height = job.device, self.texture.height
         if device.is_hardware:  # GPUs copy to textures at a hundredth of their memory's speed
             self.bind(0)
-            program = job.program("memory_fill.comp", version=430)
+            program = job.program("memory_fill.comp", version=COMPUTE_VERSION)
             program["value"], program["rows"] = 0xFFFFFFFF if ones else 0, height
             program.run(MEMORY_WIDTH // 64, height)
             return

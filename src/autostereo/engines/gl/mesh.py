@@ -19,10 +19,10 @@ from ...transforms import apply
 from ..reference.shading import lights_in_eye_space
 from . import mesh_painter as painter
 from .atlas import enable_clipping
-from .context import Device
-from .job import Job, Stage
+from .context import COMPUTE_VERSION, Device
+from .job import Job, Stage, put_lights
 from .mesh_buffers import Part, upload_meshes
-from .programs import Defines
+from .programs import Defines, put, put_textures
 
 IMAGE_UNIT = 0
 FEW = 500  # triangles that stand for all where costs are estimated
@@ -121,7 +121,7 @@ class Meshes(Stage):
         for part in self._parts:
             defines = {**switches(job, part), **depth}
             check_outputs(job, defines)
-            program = job.masked_program("quad.vert", "quad.frag", defines=defines, version=430)
+            program = job.masked_program("quad.vert", "quad.frag", defines=defines, version=COMPUTE_VERSION)
             set_material(program, job, part)
             job.device.bind_storage(part.vertices, 0)
             job.device.bind_storage(part.indices, 1)
@@ -129,10 +129,7 @@ class Meshes(Stage):
             quads = job.vertex_array(program, [], job.kept.get("quads", self._most, lambda: self._quads(job.device)))
             for tile in range(job.count):
                 channel = job.first + tile
-                program["tile"] = tile
-                _set(program, "sample_at", [(column, job.row) for column in job.columns])
-                if "channel" in program:
-                    program["channel"] = channel
+                put(program, tile=tile, channel=channel, sample_at=[(column, job.row) for column in job.columns])
                 quads.render(vertices=6 * part.triangles)
 
     @property
@@ -214,16 +211,7 @@ def switches(job: Job, part: Part) -> Defines:
 def set_material(program: Any, job: Job, part: Part) -> None:
     """Give a part's material and texture, and the scene's lights, to a program that shades."""
     material = part.material
-    _set(program, "material", (material.ambient, material.diffuse, material.specular, material.shininess))
-    lights = lights_in_eye_space(job.scene.lights, job.draw.camera)
-    _set(program, "light_place", [place for place, _ in lights])
-    _set(program, "light_color", [color for _, color in lights])
+    put(program, material=(material.ambient, material.diffuse, material.specular, material.shininess))
+    put_lights(program, job)
     if part.texture is not None:
-        part.texture.use(IMAGE_UNIT)
-        if "image" in program:
-            program["image"] = IMAGE_UNIT
-
-
-def _set(program: Any, name: str, values: Any) -> None:
-    if name in program:  # drivers drop what a shader does not use
-        program[name].write(np.array(values, dtype=np.float32).tobytes())
+        put_textures(program, image=(part.texture, IMAGE_UNIT))

@@ -29,6 +29,7 @@ import numpy as np
 
 from ...errors import UnsupportedError
 from ...scene.mesh import Mesh
+from .context import COMPUTE_VERSION
 from .job import CLEARLY, Job
 from .mesh import Meshes, set_material, switches
 from .panel import NOTHING, Panel, write_only
@@ -48,11 +49,10 @@ from .plane_buffers import (
     rounds,
     upload_blocks,
 )
-from .programs import Defines
+from .programs import Defines, put
 
 ONE_VIEW = "plane-rasterizer-n-pass"
 METHODS = ("plane-rasterizer", ONE_VIEW, "plane-rasterizer-planar", "plane-rasterizer-staggered")
-VERSION = 430  # compute shaders and storage buffers
 # SHADER_STORAGE, SHADER_IMAGE_ACCESS, COMMAND, BUFFER_UPDATE, TEXTURE_UPDATE; TEXTURE_FETCH, FRAMEBUFFER for pictures
 BARRIERS = 0x2000 | 0x20 | 0x40 | 0x200 | 0x100 | 0x8 | 0x400
 GROUP = 64  # invocations of a work group
@@ -116,7 +116,7 @@ class PlaneMeshes(Meshes):
     def _is_fastest(self, job: Job) -> bool:
         """Whether a single pass is expected to be clearly faster this way: many triangles in many views."""
         draw, camera = job.draw, job.draw.camera
-        able = job.device.version >= VERSION and max(camera.width, camera.height) <= MAX_SIDE
+        able = job.device.version >= COMPUTE_VERSION and max(camera.width, camera.height) <= MAX_SIDE
         if draw.method != "single-pass" or not able or any(type(item) is not Mesh for item in job.scene.objects):
             return False
         place = camera.eye_from_world.tobytes(), draw.offsets.tobytes(), draw.culling, draw.viewmap
@@ -152,7 +152,7 @@ class Drawing:
     """One draw of meshes into the tiles of the job's atlas, or into a panel."""
 
     def __init__(self, job: Job, parts: list[Any]) -> None:
-        job.device.require(VERSION, f"method {job.draw.method!r}")
+        job.device.require(COMPUTE_VERSION, f"method {job.draw.method!r}")
         check_size(job)
         self.job, self.parts = job, parts
         kept, device = job.kept, job.device
@@ -176,8 +176,8 @@ class Drawing:
             corners = Corners(self.job.device, part)
             corners.triangles.bind(1)
             self.job.device.bind_storage(part.indices, 1)
-            program = self.job.program("plane_corners.comp", version=VERSION)
-            _set(program, count=part.triangles)
+            program = self.job.program("plane_corners.comp", version=COMPUTE_VERSION)
+            put(program, count=part.triangles)
             _run(program, part.triangles)
             result.append(corners)
         self.job.device.ctx.memory_barrier(BARRIERS)
@@ -235,9 +235,9 @@ class Drawing:
         offsets = Memory(device, 16 * part.tiles * part.planes, 1, "f4")
         shown.bind(4)
         offsets.bind(5)
-        program = job.masked_program("plane_shown.comp", version=VERSION)
-        _set(program, picture=(part.width, part.rows), first_row=part.first_row)
-        _set(program, grouping=(self.size, len(self.blocks)))
+        program = job.masked_program("plane_shown.comp", version=COMPUTE_VERSION)
+        put(program, picture=(part.width, part.rows), first_row=part.first_row)
+        put(program, grouping=(self.size, len(self.blocks)))
         _run(program, part.tiles)
         device.ctx.memory_barrier(BARRIERS)
         return shown, offsets
@@ -251,7 +251,7 @@ class Drawing:
                     self._find_tiles(part, views, find_depth)
                 with _stage(self.job, "depth" if find_depth else "winner"):
                     fine = self._program("plane_fine.comp", part, views)
-                    _set(fine, find_depth=find_depth, room=self.queue.room)
+                    put(fine, find_depth=find_depth, room=self.queue.room)
                     fine.run_indirect(self.queue.counters, 4 * (8 + 6))
                 if not find_depth:
                     self._find_tiles(part, views, find_depth, repeat=True)
@@ -261,18 +261,19 @@ class Drawing:
         for number, first, count in chunk:
             mesh, corners = self.parts[number], self.corners[number]
             with _stage(self.job, "vertices"):
-                program = self.job.program("plane_vertex.comp", defines=switches(self.job, mesh), version=VERSION)
+                defines = switches(self.job, mesh)
+                program = self.job.program("plane_vertex.comp", defines=defines, version=COMPUTE_VERSION)
                 set_material(program, self.job, mesh)
                 self.job.device.bind_storage(mesh.vertices, 1)
                 corners.points.bind(6)
                 corners.surfaces.bind(7)
-                _set(program, count=mesh.corners)
+                put(program, count=mesh.corners)
                 _run(program, mesh.corners)
             with _stage(self.job, "setup"):
                 corners.triangles.bind(1)
                 program = self._program("plane_setup.comp", part, views)
-                _set(program, range=(first, count), first_triangle=int(self.numbers[number]), room=self.room)
-                _set(program, two_sided=mesh.two_sided, reach=views.reach)
+                put(program, range=(first, count), first_triangle=int(self.numbers[number]), room=self.room)
+                put(program, two_sided=mesh.two_sided, reach=views.reach)
                 _run(program, count)
         self.queue.entries.bind(1)
         self.block_texture.bind_to_image(7)
@@ -282,16 +283,16 @@ class Drawing:
         """Fill the queue; or, where it has overflowed, rasterise everything once more."""
         with _stage(self.job, "tiles"):
             program = self._program("plane_tiles.comp", part, views)
-            _set(program, room=self.queue.room, triangle_room=self.room, find_depth=find_depth, everything=repeat)
+            put(program, room=self.queue.room, triangle_room=self.room, find_depth=find_depth, everything=repeat)
             for large in (False, True):
-                _set(program, large=large)
+                put(program, large=large)
                 program.run_indirect(self.queue.counters, 4 * (8 + (9 if repeat else 0) + 3 * large))
         if not repeat:
             self._size_dispatches(part, views, 2)
 
     def _size_dispatches(self, part: Round, views: Pass, after: int) -> None:
         program = self._program("plane_args.comp", part, views)
-        _set(program, after_stage=after, room=self.queue.room)
+        put(program, after_stage=after, room=self.queue.room)
         program.run(1)
         self.job.device.ctx.memory_barrier(BARRIERS)
 
@@ -302,10 +303,10 @@ class Drawing:
             "PLANAR": method == "plane-rasterizer-planar",
             "STAGGER": method == "plane-rasterizer-staggered",
         }
-        program = self.job.program(name, defines=defines, version=VERSION)
-        _set(program, picture=(part.width, part.rows), first_row=part.first_row, sample_at=self.sample_at)
-        _set(program, pass_views=(views.first, views.count, self.size, self.views_in_all))
-        _set(program, plane_count=part.planes, first_offset=float(self.job.draw.offsets[0]))
+        program = self.job.program(name, defines=defines, version=COMPUTE_VERSION)
+        put(program, picture=(part.width, part.rows), first_row=part.first_row, sample_at=self.sample_at)
+        put(program, pass_views=(views.first, views.count, self.size, self.views_in_all))
+        put(program, plane_count=part.planes, first_offset=float(self.job.draw.offsets[0]))
         return program
 
     def _encode(self, part: Round, first_tile: int, picture: Any) -> None:
@@ -315,23 +316,23 @@ class Drawing:
         for number, (mesh, corners) in enumerate(zip(self.parts, self.corners, strict=True)):
             with _stage(job, "encode"):
                 defines = {**switches(job, mesh), "PANEL": self.on_panel}
-                program = job.program("plane_encode.comp", defines=defines, version=VERSION)
+                program = job.program("plane_encode.comp", defines=defines, version=COMPUTE_VERSION)
                 set_material(program, job, mesh)
                 corners.triangles.bind(1)
                 corners.points.bind(6)
                 corners.surfaces.bind(7)
                 picture.bind_to_image(4)
-                _set(program, picture=(part.width, part.rows), first_row=part.first_row, sample_at=self.sample_at)
-                _set(program, first_tile=first_tile, plane_count=part.planes, flip=(job.draw.flip_x, job.draw.flip_y))
-                _set(program, range=(int(self.numbers[number]), mesh.triangles))
+                put(program, picture=(part.width, part.rows), first_row=part.first_row, sample_at=self.sample_at)
+                put(program, first_tile=first_tile, plane_count=part.planes, flip=(job.draw.flip_x, job.draw.flip_y))
+                put(program, range=(int(self.numbers[number]), mesh.triangles))
                 program.run(*groups)
 
     def _write_depths(self, part: Round, tiles: range) -> None:
         """Into the atlas's depth buffer."""
         job, ctx = self.job, self.job.device.ctx
-        program = job.program("tile.vert", "plane_depth.frag", version=VERSION)
-        _set(program, first_view=tiles.start, first_tile=tiles.start, plane_count=part.planes)
-        _set(program, picture=(part.width, part.rows), first_row=part.first_row)
+        program = job.program("tile.vert", "plane_depth.frag", version=COMPUTE_VERSION)
+        put(program, first_view=tiles.start, first_tile=tiles.start, plane_count=part.planes)
+        put(program, picture=(part.width, part.rows), first_row=part.first_row)
         write_only(job.atlas.target, NOTHING)
         ctx.enable_only(ctx.DEPTH_TEST)
         job.vertex_array(program, []).render(ctx.TRIANGLE_STRIP, vertices=4, instances=len(tiles))
@@ -353,13 +354,6 @@ def check_size(job: Job) -> None:
             f"method {job.draw.method!r}: pictures have at most {MAX_SIDE} pixels a side, "
             f"this one {camera.width}×{camera.height}: choose a smaller size or single-pass"
         )
-
-
-def _set(program: Any, **values: Any) -> None:
-    """Set those of the uniforms that the program uses."""
-    for name, value in values.items():
-        if name in program:
-            program[name] = value
 
 
 def _run(program: Any, invocations: int) -> None:

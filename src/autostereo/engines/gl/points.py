@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 
 from ...scene.points import Points
 from .atlas import Layout
-from .context import Device
+from .context import COMPUTE_VERSION, Device
 from .job import Job, Stage
 from .panel import Panel, write_only
 from .points_buffers import CONSTANTS, SurfelBuffers
 from .points_quads import Quads
-from .points_splat import VERSION, splat
+from .points_splat import splat
+from .programs import put, put_textures
 
 SHEET_PIXELS = 2**22  # of a sheet: with all its sums a quarter of a gigabyte for panels
 OFFSETS, STOPS = 0, 1  # texture units
@@ -58,11 +59,7 @@ class Sheet:
 
     def give(self, program: Any) -> None:
         """Bind the textures that a program reads."""
-        for name, texture, unit in (("offsets", self.offsets, OFFSETS), ("stops", self.stops, STOPS)):
-            if name in program:
-                assert texture is not None
-                texture.use(unit)
-                program[name] = unit
+        put_textures(program, offsets=(self.offsets, OFFSETS), stops=(self.stops, STOPS))
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +107,7 @@ class PointClouds(Stage):
                 self._stop(job, part, job.atlas.depth)
             splat(job, self._buffers, part)
             program = job.masked_program if job.mask is not None else job.program
-            resolve = program("tile.vert", "points_resolve.frag", defines=CONSTANTS, version=VERSION)
+            resolve = program("tile.vert", "points_resolve.frag", defines=CONSTANTS, version=COMPUTE_VERSION)
             resolve["first_view"] = first
             job.atlas.target.use()
             job.device.ctx.enable_only(job.device.ctx.DEPTH_TEST)
@@ -159,8 +156,7 @@ class PointClouds(Stage):
         )
         depths.use(STOPS)
         program["depths"], program["sheet"] = STOPS, part.place
-        if "held" in program:
-            program["held"] = part.first, part.count
+        put(program, held=(part.first, part.count))
         part.sheet.stops_target.use()
         part.sheet.stops_target.clear(depth=0.0)
         ctx.enable_only(ctx.DEPTH_TEST)
@@ -172,7 +168,7 @@ class PointClouds(Stage):
         """Normalise a band into the panel's colours and depths, a channel at a time: they may be seen apart."""
         ctx = job.device.ctx
         defines = {**CONSTANTS, "PANEL": True, "QUADS": quads}
-        program = job.masked_program("screen.vert", "points_resolve.frag", defines=defines, version=VERSION)
+        program = job.masked_program("screen.vert", "points_resolve.frag", defines=defines, version=COMPUTE_VERSION)
         if quads:
             self._quads.give(job, part, program)
         program["sheet"] = part.place

@@ -13,10 +13,10 @@ from ...scene.points import Points
 from ..constants import MEMORY_WIDTH
 from ..reference.points import LEAST_RADIUS, Surfels
 from ..reference.shading import lights_in_eye_space
-from .context import Device
-from .job import Job
+from .context import COMPUTE_VERSION, Device
+from .job import Job, put_lights
 from .memory import Memory
-from .programs import Defines
+from .programs import Defines, put
 
 FLOATS = 12  # of a surfel as it is sent; see shaders/points_setup.comp
 RECORD = 7  # texels of one that is ready; see shaders/lib/surfels.glsl
@@ -71,13 +71,13 @@ class SurfelBuffers:
         job.kept.get("surfels", (self, job.draw), lambda: self._run_setup(job))
 
     def _run_setup(self, job: Job) -> bool:
-        program = job.program("points_setup.comp", defines=self.switches(job), version=430)
+        program = job.program("points_setup.comp", defines=self.switches(job), version=COMPUTE_VERSION)
         self._points.bind_to_storage_buffer(POINTS)
         self.ready.bind(0)
         self._materials.bind_to_storage_buffer(MATERIALS)
         program["count"] = self.count
         program["reach"] = job.draw.culling
-        set_lights(program, job)
+        put_lights(program, job)
         program.run(*work_groups(self.count))
         job.device.ctx.memory_barrier()
         return True
@@ -92,22 +92,11 @@ def work_groups(invocations: int) -> tuple[int, int]:
 def give_draw(program: Any, job: Job, place: tuple[float, ...]) -> None:
     """Give a program where it draws, `place` as points.Part has it, and what shaders need to know."""
     columns = job.columns or (0.5, 0.5, 0.5)
-    given = {
-        "sheet": place, "sample_range": (min(columns), max(columns), job.row, job.row), "reach": job.draw.culling,
-        "columns": columns, "row": job.row,
-    }  # fmt: skip
-    for name, value in given.items():
-        if name in program:
-            program[name] = value
-    set_lights(program, job)
-
-
-def set_lights(program: Any, job: Job) -> None:
-    """Give the scene's lights to a program that includes lib/shading.glsl."""
-    lights = lights_in_eye_space(job.scene.lights, job.draw.camera)
-    for name, values in (("light_place", [p for p, _ in lights]), ("light_color", [c for _, c in lights])):
-        if name in program:
-            program[name].write(np.array(values, dtype=np.float32).tobytes())
+    put(
+        program, sheet=place, sample_range=(min(columns), max(columns), job.row, job.row), reach=job.draw.culling,
+        columns=columns, row=job.row,
+    )  # fmt: skip
+    put_lights(program, job)
 
 
 def _arrays(cloud: Points, middle: NDArray[np.float64], material: int) -> NDArray[np.float64]:

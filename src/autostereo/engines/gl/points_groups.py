@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import UnsupportedError
 from .atlas import Layout
-from .context import Device
+from .context import COMPUTE_VERSION, Device
 from .job import Job
 from .points_buffers import CONSTANTS, SurfelBuffers
 from .programs import Defines
@@ -76,7 +76,8 @@ def sum_groups(job: Job, quads: Quads, part: Part, target: Any, count: int) -> N
     ctx.enable_only(ctx.DEPTH_TEST)
     quads.render(job, program)
 
-    program = job.program("screen.vert", "points_blend.frag", defines={**CONSTANTS, "GROUPS": count}, version=430)
+    defines = {**CONSTANTS, "GROUPS": count}
+    program = job.program("screen.vert", "points_blend.frag", defines=defines, version=COMPUTE_VERSION)
     for name, unit in (("shares", SHARES), ("epsilons", EPSILONS), ("kept", KEPT)):
         getattr(groups, name).use(unit)
         program[name] = unit

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .context import ADD, Device
+from .context import ADD, COMPUTE_VERSION, Device
 from .job import Job
 from .points_buffers import CONSTANTS, RECORDS, SurfelBuffers, give_draw
 from .points_groups import number_of_groups, sum_groups
-from .programs import Defines
+from .programs import Defines, put_textures
 
 if TYPE_CHECKING:
     from .points import Part, Sheet
@@ -39,12 +39,8 @@ class Blended:
 
     def give(self, program: Any) -> None:
         """Bind the textures that a program reads."""
-        for name, texture, unit in (
-            ("nearest", self.nearest, NEAREST), ("sums", self.sums, SUMS), ("weights", self.weights, WEIGHTS)
-        ):  # fmt: skip
-            if name in program:
-                texture.use(unit)
-                program[name] = unit
+        held = {"nearest": (self.nearest, NEAREST), "sums": (self.sums, SUMS), "weights": (self.weights, WEIGHTS)}
+        put_textures(program, **held)
 
 
 class Quads:
@@ -101,7 +97,7 @@ class Quads:
         """The program that draws quads with these fragments, told all but where the fragments read."""
         stopped = part.sheet.stops is not None
         switches: Defines = {**self.surfels.switches(job), "THREE_RAYS": True, "STOPPED": stopped, **defines}
-        program = job.program("points.vert", fragments, defines=switches, version=430)
+        program = job.program("points.vert", fragments, defines=switches, version=COMPUTE_VERSION)
         part.sheet.give(program)
         self.surfels.ready.texture.use(RECORDS)
         program["surfels"] = RECORDS

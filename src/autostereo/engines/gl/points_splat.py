@@ -13,18 +13,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .context import Device
+from .context import COMPUTE_VERSION, Device
 from .job import Job
 from .memory import Memory
 from .points_buffers import MOST_GROUPS, SurfelBuffers, give_draw, work_groups
 from .points_lattice import Lattice, find_lattice
-from .programs import Defines
+from .programs import Defines, put
 
 if TYPE_CHECKING:
     from .points import Part, Sheet
 
 BAND_ROWS = 32  # of a GPU's invocation
-VERSION = 430
 
 
 class Sums:
@@ -65,12 +64,11 @@ def splat(job: Job, surfels: SurfelBuffers, part: Part) -> None:
     band = max(band_rows(job.device), -(-2 * part.count * rows // MOST_GROUPS))
     for nearest in (True, False):
         ctx.memory_barrier()
-        program = job.program("points_splat.comp", defines={**defines, "NEAREST": nearest}, version=VERSION)
+        program = job.program("points_splat.comp", defines={**defines, "NEAREST": nearest}, version=COMPUTE_VERSION)
         sheet.give(program)
         give_draw(program, job, part.place)
         program["count"], program["band_rows"] = surfels.count, band
-        if "first_view" in program:
-            program["first_view"] = part.first
+        put(program, first_view=part.first)
         if lattice is not None:
             program["phase_step"], program["flip"] = lattice.step, (job.draw.flip_x, job.draw.flip_y)
             program["slots"].write(lattice.slots.tobytes())

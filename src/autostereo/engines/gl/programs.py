@@ -13,6 +13,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...errors import UnsupportedError
 from ..constants import SHADER_CONSTANTS
 from .context import GL_VERSION, Device
@@ -20,6 +22,8 @@ from .context import GL_VERSION, Device
 SHADERS = Path(__file__).parent / "shaders"
 STAGES = {".vert": "vertex_shader", ".geom": "geometry_shader", ".frag": "fragment_shader", ".comp": "compute_shader"}
 INCLUDE = re.compile(r'^#include "([^"]+)"[^\n]*$', re.MULTILINE)
+
+TYPES = {"f": np.float32, "i": np.int32, "I": np.uint32, "d": np.float64}  # of uniforms, by moderngl's letters
 
 Defines = Mapping[str, "bool | int | float"]
 
@@ -59,6 +63,22 @@ def expand(text: str, defines: Defines | None = None, version: int = GL_VERSION)
 def source(name: str, defines: Defines | None = None, version: int = GL_VERSION) -> str:
     """The completed text of a stage's file in `shaders/`."""
     return expand(_read(name), defines, version)
+
+
+def put(program: Any, **uniforms: Any) -> None:
+    """Set those of the uniforms, numbers or arrays, that a program has: drivers drop what a shader does not use."""
+    for name, value in uniforms.items():
+        if name in program:
+            uniform = program[name]
+            uniform.write(np.ascontiguousarray(value, dtype=TYPES[uniform.fmt[-1]]).tobytes())
+
+
+def put_textures(program: Any, **textures: tuple[Any, int]) -> None:
+    """Bind textures to units, and give them to those of the samplers that a program has."""
+    for name, (texture, unit) in textures.items():
+        if name in program:
+            texture.use(unit)
+            program[name] = unit
 
 
 class Programs:

@@ -36,12 +36,12 @@ from ..reference.shading import lights_in_eye_space
 from ..volumes import Slices, make_slices
 from .beneath import Beneath
 from .context import Device
-from .job import Job, Stage
+from .job import Job, Stage, put_lights
 from .panel import EVERYTHING, NOTHING, Panel, write_only
-from .programs import Defines
+from .programs import Defines, put
 from .volume_data import TABLE, Look, is_shaded, make_table, place_in, send, table_range
 from .volume_slices import slices_on_panel, slices_on_tiles
-from .volume_space import most_half_spaces, placing, put, put_units
+from .volume_space import most_half_spaces, placing
 
 TOGETHER = 4  # volumes that compose in one march: each takes three of the 16 texture units that there are at least
 NEAR, NEAR_UNLIT = 0.75, 0.25  # voxels that a shared lookup may be beside a ray
@@ -116,9 +116,9 @@ class Rays(Stage):
                 continue
             period = sorted_period(job, group)
             drawn = self._sorted(job, panel).target if period else target
-            put_units(program, period=period)
+            put(program, period=period)
             for channel, mask in enumerate(masks(job, group)):
-                put_units(program, channel=channel)
+                put(program, channel=channel)
                 write_only(drawn, mask)
                 render(job, program, (drawn, job.device.ctx.NOTHING, False))
             write_only(drawn)
@@ -135,7 +135,7 @@ class Rays(Stage):
         program = job.masked_program("volume.vert", "sorted.frag", defines=defines)
         put(program, reach=job.draw.culling, **placing(group, job.draw.camera))
         self._sorted(job, panel).color.use(0)
-        put_units(program, period=period, picture=0)
+        put(program, period=period, picture=0)
         render(job, program, (panel.target, job.device.ctx.NOTHING, False))
 
     def _slices(self, job: Job) -> Slices | None:
@@ -193,7 +193,7 @@ class Rays(Stage):
             voxels[k].texture.use(VOXELS + k)
             looks[k].emptiness.use(EMPTY + k)
         count = range(len(group))
-        put_units(program, voxels=[VOXELS + k for k in count], emptiness=[EMPTY + k for k in count])
+        put(program, voxels=[VOXELS + k for k in count], emptiness=[EMPTY + k for k in count])
         shared = job.draw.options.volume == "shared" and group[0].mode == "composite"
         near = NEAR if any(is_shaded(v) for v in group) else NEAR_UNLIT
         put(program, slices=(slices.first, slices.distance, slices.slabs), share_within=near if shared else -1.0)
@@ -202,14 +202,13 @@ class Rays(Stage):
         lit = [(m.ambient, m.diffuse, m.specular, m.shininess) for m in materials]
         unlit = (1.0, 0.0, 0.0, 0.0)
         put(program, volume_material=[m if is_shaded(v) else unlit for v, m in zip(group, lit, strict=True)])
-        lights = lights_in_eye_space(job.scene.lights, job.draw.camera)
-        put(program, light_place=[p for p, _ in lights], light_color=[c for _, c in lights])
+        put_lights(program, job)
         volume = group[0]
         if volume.mode == "composite":
             self._tell_tables(program, job, group, slices)
         elif looks[0].colors is not None:
             looks[0].colors.use(TABLES)
-            put_units(program, most_colors=TABLES)
+            put(program, most_colors=TABLES)
             put(program, most_place=place_in((0.0, 1.0), (0.0, 1.0), looks[0].colors.width))
         else:
             (low, high), iso = volume.value_range, volume.iso
@@ -225,7 +224,7 @@ class Rays(Stage):
             make = partial(make_table, job.device, volume, 2.0 ** (step / LENGTHS), each == 3)
             table = job.kept.get(("slab table", k, each), (volume.transfer, step), make)
             table.use(TABLES + k)
-        put_units(program, slab_table=[TABLES + k for k in range(len(group))])
+        put(program, slab_table=[TABLES + k for k in range(len(group))])
         put(program, table_place=[place_in(table_range(v), v.value_range, TABLE) for v in group])
 
 

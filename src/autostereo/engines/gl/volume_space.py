@@ -34,17 +34,3 @@ def placing(volumes: list[Volume], camera: Camera) -> dict[str, Any]:
 def most_half_spaces(volumes: list[Volume]) -> int:
     """Half-spaces of the volume that has most."""
     return max(len(half_spaces(v)) for v in volumes)
-
-
-def put(program: Any, **uniforms: Any) -> None:
-    """Set uniforms of float32, those that the program has."""
-    for name, values in uniforms.items():
-        if name in program:
-            program[name].write(np.ascontiguousarray(values, dtype=np.float32).tobytes())
-
-
-def put_units(program: Any, **units: Any) -> None:
-    """Set the texture units of samplers, those that the program has."""
-    for name, values in units.items():
-        if name in program:
-            program[name].write(np.ascontiguousarray(values, dtype=np.int32).tobytes())
