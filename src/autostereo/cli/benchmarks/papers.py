@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from . import papers_mesh, papers_plane, papers_volume
+from . import papers_data, papers_mesh, papers_plane, papers_volume
 from .harness import machine_facts
 from .papers_published import ILLUMINATION_2008, PASSES_2008, SOURCES, VIEWS_2008, VOLUMES_512
 from .papers_studio import PapersStudio
@@ -46,8 +46,10 @@ WORKS: dict[str, Work[PapersStudio]] = {
         tuple(f"{views} views" for views in (8, 16, 48, 96)),
     ),
     "2007b-points": Work("2007b Chart 2: points", papers_mesh.chart_points, tuple(papers_mesh.POINTS)),
-    "2007b-triangles": Work("2007b Chart 3: triangles", papers_mesh.chart_triangles, tuple(papers_mesh.SUBDIVISIONS)),
-    "2007b-immediate": Work("2007b Chart 4: immediate mode", papers_mesh.chart_immediate),
+    "2007b-triangles": Work("2007b Chart 3: triangles", papers_mesh.chart_triangles, tuple(papers_data.MESHES)),
+    "2007b-immediate": Work(
+        "2007b Chart 4: immediate mode", papers_mesh.chart_immediate, tuple(papers_data.MESHES)
+    ),
     "2007a-chart2": Work("2007a Chart 2: stereo", papers_volume.chart_stereo, VOLUMES),
     "2020-headline": Work("2020: 96 views, a million vertices", papers_plane.headline, ("1M vertices",)),
     "2008-table3": Work("2008 Table 3: passes", papers_mesh.table_passes, tuple(PASSES_2008)),
@@ -57,6 +59,9 @@ WORKS: dict[str, Work[PapersStudio]] = {
         "2020 Fig. 14: stages",
         papers_plane.stage_times,
         ("512×384, 16 views", "1024×768, 16 views", "1024×768, 48 views"),
+    ),
+    "2020-stagger": Work(
+        "2020 section 4.3: triangles begin with different views", papers_plane.staggered, tuple(papers_plane.STAGGERED)
     ),
     "2020-multiplications": Work(
         "2020 section 3: multiplications", papers_plane.multiplications, ("1 view", "8 views", "48 views")

@@ -20,6 +20,8 @@ BUCKY, NEGHIP, HYDROGEN, ENGINE, SKULL = (
     "Buckyball 32³", "Neghip 64³", "Hydrogen 128³", "Engine 256³", "Skull 256³"
 )  # fmt: skip
 
+BUNNY, DRAGON = "Bunny 69k", "Dragon 100k"  # meshes that 2007b's charts may have had: its data are Stanford's
+
 VOLUMES_512: Table = {  # 2007a, Table 1: 512×512, 8 views
     BUCKY: {SV: 463, MV: 51, GPU_MV: 128},
     NEGHIP: {SV: 241, MV: 29, GPU_MV: 57},
