@@ -16,6 +16,7 @@ from autostereo.cli.benchmarks import (
     papers_data,
     papers_plane,
     papers_published,
+    papers_volume,
     report,
     suite,
     workloads,
@@ -56,7 +57,7 @@ def test_published_figures_are_those_of_the_papers():
     assert printed(p.VOLUMES_512) == "463/51/128 · 241/29/57 · 89/10/26 · 15/1.9/8.3 · 15/1.8/7.8"
     large = "116/12.8/39/26.6 · 58.8/6.8/25.6/11.9 · 24.8/3.3/10.5/5.5 · 6.4/0.9/1.9/2.1 · 5.9/0.8/1.8/2"
     assert printed(p.VOLUMES_1900) == large
-    assert printed(p.SUBRES_512) == "8.3/1.9/3"
+    assert printed(p.FIGURE_6) == "8.3/1.9/3"
     assert printed(p.VIEWS_2008) == "157/157 · 80/141 · 38/70 · 19/24"
     assert printed(p.ILLUMINATION_2008) == "326/326/160/160 · 168/167/83/83 · 80/80/28/28 · 60/60/24/23"
     assert printed(p.PASSES_2008) == "14/15/23/21/14"
@@ -121,6 +122,14 @@ def test_vertices_of_their_own_draw_the_same_picture():
         assert len(own.objects[0].vertices) == 3 * len(mesh.faces) and own.objects[0].two_sided == mesh.two_sided
 
 
+def test_small_views_have_the_papers_sizes():
+    """256×256 for a panel of 512×512, 512×512 for one of 1900×1200 (2007a: Fig. 6, Table 2)."""
+    studio, rig = PapersStudio(BenchOptions(), silent), workloads.rig_for(Scene((icosphere(1),)), 8, SIZE)
+    for name, size in (("MV sub-res 256×256", (256, 256)), ("MV sub-res 512×512", (512, 512))):
+        way = papers_volume.small_views(studio, name, Display.wavelength_selective(*SIZE), rig)
+        assert (way.method, way.options.small_size) == ("n-pass-subres", size)
+
+
 def test_staggering_changes_no_picture(measured):
     unlike = [f for f in measured.results if f["measure"] == "numbers that differ"]
     assert len(unlike) == 2 and {f["value"] for f in unlike} == {0.0} and {f["bar"] for f in unlike} == {"≤ 0"}
@@ -164,9 +173,9 @@ def test_fidelity_is_that_of_the_views():
 
 def test_ours_stands_beside_what_is_printed(measured):
     assert found(measured, "2007a-table1", "Engine 256³", "GPU-MV")["published"] == 8.3
-    assert found(measured, "2007a-table1", "Engine 256³", "MV sub-res")["published"] == 3
+    assert found(measured, "2007a-table1", "Engine 256³", "MV sub-res 256×256")["published"] == 3
     assert found(measured, "2007a-table1", "Engine 256³", "MV / GPU-MV")["published"] == pytest.approx(8.3 / 1.9)
-    assert found(measured, "2007a-table2", "Skull 256³", "MV sub-res")["published"] == 1.8
+    assert found(measured, "2007a-table2", "Skull 256³", "MV sub-res 512×512")["published"] == 1.8
     assert found(measured, "2007a-table2", "Skull 256³", "MV of SV")["published"] == pytest.approx(100 * 0.8 / 5.9)
     assert found(measured, "2007b-points", "1M surfels", "GPU-MV of SV")["published"] == pytest.approx(100 / 3)
     assert found(measured, "2008-table1", "4 views", "geometry-shader")["published"] == 70
@@ -193,7 +202,7 @@ def test_what_approximations_lose_is_told_apart(measured):
         for engine in ("", ", cpu engine"):
             lost = {m: value for m, value in every.items() if m.endswith("cpu engine") == bool(engine)}
             assert lost.pop(f"PSNR of exact opacity{engine}") > 60  # the same rays in one pass
-            names = "averaged opacity", "MV sub-res", "shared lookups"
+            names = "averaged opacity", "MV sub-res 256×256", "shared lookups"
             assert set(lost) == {f"PSNR of {name}{engine}" for name in names}
             assert all(value < 60 for value in lost.values()), (scene, lost)
 

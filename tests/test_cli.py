@@ -65,6 +65,16 @@ def test_render_takes_a_camera_a_background_and_options(cli: Run, folder: Path) 
     assert np.array_equal(pixels("out.png"), panel.pixels)
 
 
+def test_render_takes_the_size_of_small_views(cli: Run, folder: Path) -> None:
+    small = ("--method", "n-pass-subres", "--small-size", "9x7")
+    assert cli("render", "square.off", "-d", "lenticular-8", "-o", "out.png", *SMALL, *small).status == 0
+    display = aus.Display.preset("lenticular-8").resized(48, 64)
+    options = aus.Options(small_size=(9, 7))
+    panel = aus.render(aus.load("square.off"), display, method="n-pass-subres", options=options)
+    assert np.array_equal(pixels("out.png"), panel.pixels)
+    refused(cli("render", "square.off", "-d", "lenticular-8", *SMALL, *small[:3], "49x1"), "small_size", "48×64")
+
+
 def test_render_merges_its_inputs(cli: Run, folder: Path) -> None:
     Path("other.off").write_text(SQUARE.replace("-1 -1 0", "-1 -1 1"))
     assert cli("render", "square.off", "other.off", "-d", "lenticular-8", "-o", "out.png", *SMALL).status == 0

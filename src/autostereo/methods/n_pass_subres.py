@@ -1,6 +1,7 @@
 """N passes at sub-resolution: small views, scaled up while they are interlaced (Hübner 2007a, section 2.3).
 
-Each view has about 1/V of the panel's pixels, so that all views together cost about one panel; the picture is blurred.
+Each view has about 1/V of the panel's pixels, so that all views together cost about one panel, or the size that
+`Options.small_size` says; the picture is blurred.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..engines.engine import Draw, Engine, Target
+from ..engines.engine import Draw, Engine, Target, small_camera
 from ..errors import UnsupportedError
 from ..frame import ViewStack
 from . import n_pass
@@ -26,15 +27,8 @@ def draw_panel(engine: Engine, prepared: Any, draw: Draw, target: Target) -> Non
     assert draw.viewmap is not None
     height, width, _ = target.color.shape
     views = len(draw.offsets)
-    small_width, small_height = max(1, round(width / views**0.5)), max(1, round(height / views**0.5))
-    camera = replace(
-        draw.camera,
-        width=small_width,
-        height=small_height,
-        fx=draw.camera.fx * small_width / width,
-        fy=draw.camera.fy * small_height / height,
-    )
-    stack = Target(np.empty((views, small_height, small_width, 4), np.uint8))
+    camera = small_camera(draw)
+    stack = Target(np.empty((views, camera.height, camera.width, 4), np.uint8))
     n_pass.draw_views(engine, prepared, replace(draw, camera=camera, viewmap=None), stack)
     columns = int(np.ceil(views**0.5))
     rows = -(-views // columns)

@@ -14,12 +14,13 @@ from .papers_published import (
     BUCKY,
     CHART_CLAIMS,
     ENGINE,
+    FIGURE_6,
     GPU_MV,
     MV,
     NEGHIP,
     SKULL,
-    SUBRES,
     SUBRES_512,
+    SUBRES_1900,
     SV,
     VOLUMES_512,
     VOLUMES_1900,
@@ -53,9 +54,9 @@ def table_512(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
     ]
     if name in (BUCKY, NEGHIP) or not studio.too_slow(work):
         ways += [Way(MV_LENTICULAR, lenses, rig, "n-pass"), Way(SLICES, filters, rig, options=Options(proxy="slices"))]
-    if name in SUBRES_512:
-        ways.append(Way(SUBRES, filters, rig, "n-pass-subres"))
-    row = studio.row(work, name, subject, ways, VOLUMES_512[name] | SUBRES_512.get(name, {}))
+    if name in FIGURE_6:
+        ways.append(small_views(studio, SUBRES_512, filters, rig))
+    row = studio.row(work, name, subject, ways, VOLUMES_512[name] | FIGURE_6.get(name, {}))
     found = row.rates()
     found.append(row.ratio(MV, GPU_MV, None if name == BUCKY else SHARED, "three views a pixel, lookups shared"))
     found.append(row.ratio(MV, EXACT, note="three views a pixel, nothing approximated; lit for each eye, unlike MV"))
@@ -77,13 +78,13 @@ def table_1900(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
     ways = [
         Way(SV, size, rig.with_views(1), "n-pass"),
         Way(MV, filters, rig, "n-pass"),
-        Way(SUBRES, filters, rig, "n-pass-subres"),
+        small_views(studio, SUBRES_1900, filters, rig),
         Way(GPU_MV, filters, rig),
         on_cpu(Way("", filters, rig), f"{GPU_MV} on {CPU}"),
     ]
     row = studio.row(work, name, subject, ways, VOLUMES_1900[name])
     found = row.rates()
-    found += [row.ratio(MV, GPU_MV), row.ratio(SUBRES, GPU_MV)]
+    found += [row.ratio(MV, GPU_MV), row.ratio(SUBRES_1900, GPU_MV)]
     return [*found, row.percent(MV, SV), row.percent(GPU_MV, SV)]
 
 
@@ -109,6 +110,15 @@ def chart_stereo(studio: PapersStudio, name: str, lighting: str) -> list[Figure]
     claims = {"2 MV": CHART_CLAIMS["stereo"][MV]}
     shares = [row.percent(way.name, SV, claims.get(way.name)) for way in ways[1:]]
     return [*row.rates(), row.ratio("2 MV", GPU_MV, STEREO, "stereo"), *shares]
+
+
+def small_views(
+    studio: PapersStudio, name: str, panel: Display, rig: workloads.Rig, options: Options | None = None
+) -> Way:
+    """Views of the paper's small size, which the name says, scaled up to the panel."""
+    width, height = (int(side) for side in name.split()[-1].split("×"))
+    options = replace(options or Options(), small_size=studio.size(width, height))
+    return Way(name, panel, rig, "n-pass-subres", options=options)
 
 
 def striped(size: workloads.Size, pixels: int) -> Display:
@@ -141,7 +151,7 @@ def alpha(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
     pairs = [
         (Way("exact opacity", filters, rig, options=OWN), OWN),
         (Way("averaged opacity", filters, rig, options=averaged), OWN),
-        (Way(SUBRES, filters, rig, "n-pass-subres", options=OWN), OWN),
+        (small_views(studio, SUBRES_512, filters, rig, OWN), OWN),
         (Way("shared lookups", filters, rig), Options()),
     ]
     return [

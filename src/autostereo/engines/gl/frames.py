@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import UnsupportedError
-from ..engine import Target
+from ..engine import Target, small_camera
 from ..gathering import Tiles
 from .atlas import Atlas, Layout
 from .blocks import stored_background
@@ -226,11 +226,8 @@ def _gather_channels(job: Job, stages: list[Stage], panel: Panel, sample: tuple[
 
 def _weave_small(job: Job, stages: list[Stage], panel: Panel) -> None:
     """Small views, scaled up while they are woven (Hübner 2007a, section 2.3), as methods/n_pass_subres.py has it."""
-    camera, views = job.draw.camera, len(job.draw.offsets)
-    width, height = (max(1, round(side / views**0.5)) for side in panel.size)
-    small = replace(
-        camera, width=width, height=height, fx=camera.fx * width / camera.width, fy=camera.fy * height / camera.height
-    )
+    small, views = small_camera(job.draw), len(job.draw.offsets)
+    width, height = small.width, small.height
     parts = list(atlases(replace(job, draw=replace(job.draw, camera=small)), "small atlas"))
     if len(parts) > 1:
         raise UnsupportedError(
