@@ -13,24 +13,21 @@ import pytest
 from autostereo.cli.benchmarks import (
     harness,
     papers,
-    papers_data,
     papers_plane,
     papers_published,
-    papers_volume,
+    papers_varyings,
     report,
     suite,
     workloads,
 )
 from autostereo.cli.benchmarks.papers_data import Subject
 from autostereo.cli.benchmarks.papers_plane import STAGGER
-from autostereo.cli.benchmarks.papers_published import BUCKY, BUNNY, DRAGON, NEGHIP
 from autostereo.cli.benchmarks.papers_studio import PapersStudio, Way, on_cpu
 from autostereo.cli.benchmarks.suite import BenchOptions, Work
 from autostereo.display.display import Display
 from autostereo.engines.options import Options
 from autostereo.errors import DependencyError, InputError
 from autostereo.render import Renderer
-from autostereo.scene.mesh import Mesh
 from autostereo.scene.scene import Scene
 from autostereo.scene.shapes import icosphere
 from gl_device import need_device
@@ -61,6 +58,7 @@ def test_published_figures_are_those_of_the_papers():
     assert printed(p.VIEWS_2008) == "157/157 · 80/141 · 38/70 · 19/24"
     assert printed(p.ILLUMINATION_2008) == "326/326/160/160 · 168/167/83/83 · 80/80/28/28 · 60/60/24/23"
     assert printed(p.PASSES_2008) == "14/15/23/21/14"
+    assert p.VARYINGS_2008 == (13, 14, 2, 4)
     assert p.HEADLINE_2020 == 60 and p.FASTER_FROM_2020 == 10 and p.MULTIPLICATIONS_2020 == (38, 8, 30)
     assert {work.split("-")[0] for work in papers.WORKS} >= set(p.SOURCES)
 
@@ -109,25 +107,12 @@ def test_every_figure_says_which_data_it_used_and_every_work_has_the_cpu_engine(
     assert work == "uploads" or any("cpu engine" in f["measure"] for f in figures)
 
 
-def test_vertices_of_their_own_draw_the_same_picture():
-    """Chart 4's triangles are Chart 3's; also of a mesh that has colours and an inside."""
-    need_device()
-    shape = icosphere(2)
-    colored = Mesh(shape.vertices, shape.faces[:100], colors=np.abs(shape.vertices).clip(0, 1))
-    for mesh in (colored, shape):
-        rig = workloads.rig_for(Scene((mesh,)), 2, SIZE)
-        own = papers_data.unindexed(Scene((mesh,)))
-        one, other = (Renderer(scene, "gl").render_views(rig, SIZE).color for scene in (Scene((mesh,)), own))
-        np.testing.assert_array_equal(one, other)
-        assert len(own.objects[0].vertices) == 3 * len(mesh.faces) and own.objects[0].two_sided == mesh.two_sided
-
-
-def test_small_views_have_the_papers_sizes():
-    """256×256 for a panel of 512×512, 512×512 for one of 1900×1200 (2007a: Fig. 6, Table 2)."""
-    studio, rig = PapersStudio(BenchOptions(), silent), workloads.rig_for(Scene((icosphere(1),)), 8, SIZE)
-    for name, size in (("MV sub-res 256×256", (256, 256)), ("MV sub-res 512×512", (512, 512))):
-        way = papers_volume.small_views(studio, name, Display.wavelength_selective(*SIZE), rig)
-        assert (way.method, way.options.small_size) == ("n-pass-subres", size)
+def test_the_ratio_of_one_number_more_stands_beside_the_papers(measured):
+    for scene, printed in (("4 views", 2.0), ("8 views", None)):
+        rate = {n: found(measured, "2008-varyings", scene, f"{n} numbers")["value"] for n in papers_varyings.NUMBERS}
+        ratio = found(measured, "2008-varyings", scene, "14 numbers / 13 numbers")
+        assert ratio["value"] == pytest.approx(rate[13] / rate[14]) and ratio["published"] == printed
+        assert found(measured, "2008-varyings", scene, "24 numbers / 13 numbers")["published"] is None
 
 
 def test_staggering_changes_no_picture(measured):
@@ -353,33 +338,3 @@ def test_references_are_read_back_nevertheless():
 def test_cpu_columns_are_drawn_by_the_cpu():
     way = on_cpu(Way("x", SIZE, workloads.rig_for(Scene((icosphere(1),)), 2, SIZE), "geometry-shader"))
     assert (way.name, way.engine, way.method) == ("cpu engine", "cpu", "single-pass")
-
-
-RAW = [(BUCKY, "Bucky.raw", 32), (NEGHIP, "neghip_64x64x64_uint8.raw", 64)]
-
-
-@pytest.mark.parametrize(("name", "file", "side"), RAW)
-def test_raw_data_of_the_papers_is_read(tmp_path, name, file, side):
-    """What has no header is of the paper's size; without the file there is a stand-in."""
-    options = BenchOptions(data=tmp_path)
-    assert "stand-in" in papers_data.volume(options, name).words
-    (tmp_path / "volumes").mkdir()
-    np.arange(side**3, dtype=np.uint8).tofile(tmp_path / "volumes" / file)
-    scene, words = papers_data.volume(options, name)
-    assert words == f"data: {file}, {side}×{side}×{side} voxels" and scene.objects[0].shape == (side,) * 3
-
-
-def test_meshes_of_the_papers_are_read(tmp_path):
-    """2007b's from the data folder; without them spheres of as many triangles."""
-    options = BenchOptions(data=tmp_path)
-    for name, least in ((BUNNY, 69_000), (DRAGON, 100_000)):
-        scene, words = papers_data.stanford(options, name)
-        count = len(scene.objects[0].faces)
-        assert least <= count < 1.01 * least and words.startswith("data: stand-in uv_sphere(")
-        assert words.endswith(f", {count} triangles")
-    (tmp_path / "meshes").mkdir()
-    header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-    header += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
-    (tmp_path / "meshes" / "dragon.ply").write_text(header + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
-    scene, words = papers_data.stanford(options, DRAGON)
-    assert words == "data: dragon.ply, 1 triangles" and len(scene.objects[0].vertices) == 3

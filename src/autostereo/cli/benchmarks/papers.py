@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from . import papers_data, papers_mesh, papers_plane, papers_volume
+from . import papers_data, papers_mesh, papers_plane, papers_varyings, papers_volume
 from .harness import machine_facts
 from .papers_published import ILLUMINATION_2008, PASSES_2008, SOURCES, VIEWS_2008, VOLUMES_512
 from .papers_studio import PapersStudio
@@ -54,6 +54,9 @@ WORKS: dict[str, Work[PapersStudio]] = {
     "2020-headline": Work("2020: 96 views, a million vertices", papers_plane.headline, ("1M vertices",)),
     "2008-table3": Work("2008 Table 3: passes", papers_mesh.table_passes, tuple(PASSES_2008)),
     "2008-table2": Work("2008 Table 2: illumination", papers_mesh.table_illumination, tuple(ILLUMINATION_2008)),
+    "2008-varyings": Work(
+        "2008 section 5: numbers between stages, 240×180", papers_varyings.varyings, ("4 views", "8 views")
+    ),
     "2008-vertices": Work("8 views of 60×45, many vertices", papers_mesh.vertex_heavy, ("1.3M triangles",)),
     "2020-fig14": Work(
         "2020 Fig. 14: stages",

@@ -23,7 +23,7 @@ POINT_BAR = Bar(1.5)
 UNLIT = Material(ambient=1.0, diffuse=0.0)
 COVERING, PAPER_SPLATS = "GPU-MV covering-quad", "GPU-MV 1+1 pass"
 INDEXED = "indexed"
-OWN_VERTICES = "no immediate mode in OpenGL's core profile: triangles with vertices of their own, kept on the device"
+OWN_VERTICES = "vertices of their own, kept on the device: OpenGL's core profile has no immediate mode"
 
 
 def chart_points(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
@@ -61,7 +61,7 @@ def chart_immediate(studio: PapersStudio, name: str, lighting: str) -> list[Figu
     row = studio.row("2007b-immediate", name, subject, [*(replace(way, scene=own) for way in ways), *indexed])
     shares = [row.percent(way.name, SV, claims[MV if way.name == MV else GPU_MV]) for way in ways[1:4]]
     pairs = zip(ways, indexed, strict=True)
-    gains = [row.ratio(way.name, other.name, note="what sharing vertices gains") for way, other in pairs]
+    gains = [row.ratio(way.name, other.name, note="times the time") for way, other in pairs]
     return [
         figure if figure.measure.endswith(INDEXED) and figure.unit == "fps" else noted(figure, OWN_VERTICES)
         for figure in [*row.rates(), *gains, *shares]

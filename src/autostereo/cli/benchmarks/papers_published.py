@@ -60,6 +60,7 @@ ILLUMINATION_2008: Table = {  # 2008, Table 2
 PASSES_2008: Table = {  # 2008, Table 3: 12 views in so many passes; one pass: N/A
     "12 views": {"2 passes": 14, "3 passes": 15, "4 passes": 23, "6 passes": 21, N_PASS: 14}
 }
+VARYINGS_2008 = (13, 14, 2.0, 4)  # section 5: from 13 to 14 numbers doubles the time, in the 4-view case
 HEADLINE_2020 = 60.0  # fps, "more than", panel 7680×4320, 96 views of 1024×512, 1 M vertices
 FASTER_FROM_2020 = 10  # views from which Fig. 15 has the one pass ahead
 MULTIPLICATIONS_2020 = (38.0, 8.0, 30.0)  # section 3: 38·m·n view by view, 8·m·n + 30·m in one pass
