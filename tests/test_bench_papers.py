@@ -13,6 +13,7 @@ import pytest
 from autostereo.cli.benchmarks import (
     harness,
     papers,
+    papers_counts,
     papers_plane,
     papers_published,
     papers_varyings,
@@ -223,8 +224,14 @@ def test_without_a_device_everything_is_reported_as_not_available(monkeypatch, c
             raise DependencyError("engine gl gets no OpenGL context")
         return get_engine(name, scene)
 
+    def no_device():
+        raise DependencyError("engine gl gets no OpenGL context")
+
     monkeypatch.setattr(door, "get_engine", missing)
+    monkeypatch.setattr(papers_counts, "get_device", no_device)
     monkeypatch.setattr(PapersStudio, "device", None)
+    counted = papers.run(quick("2020-multiplications"), silent)
+    assert len(counted) == 3 and {f["note"] for f in counted} == {"not available: engine gl gets no OpenGL context"}
     results = report.bench("papers", quick("2008-table3"), None, silent)
     refused = [f for f in results if f["value"] is None]
     reason = "not available: engine gl gets no OpenGL context; data: stand-in displaced_sphere(2), 320 triangles"

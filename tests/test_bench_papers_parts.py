@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from autostereo.cli.benchmarks import papers_data, papers_varyings, papers_volume, workloads
+from autostereo.cli.benchmarks import papers_counts, papers_data, papers_varyings, papers_volume, workloads
 from autostereo.cli.benchmarks.papers_published import BUCKY, BUNNY, DRAGON, NEGHIP
-from autostereo.cli.benchmarks.papers_studio import PapersStudio, Way
+from autostereo.cli.benchmarks.papers_studio import PapersStudio, Way, programs_in_use
 from autostereo.cli.benchmarks.suite import BenchOptions
 from autostereo.display.display import Display
 from autostereo.engines.options import Options
@@ -91,3 +91,65 @@ def test_so_many_numbers_are_handed_on_and_all_reach_the_picture(numbers):
     with device:
         program["weight"] = 0.0
     assert (changed != plain).any()
+
+
+# --- multiplications -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("code", "expected"), [
+    ("a * b + c / d;", "times(a,b)+over(c,d);"),
+    ("x = -a.y * -b[2 * i].z * c;", "x=-times(times(a.y,-b[times(2,i)].z),c);"),
+    ("w /= max(a * b, c);", "w=over(w,max(times(a,b),c));"),
+    ("return (a + b) * f(k % 3 * 2);", "returntimes((a+b),f(times((k%3),2)));"),
+    ("for (; k < 2 * n; ++k) { s *= dot(u, v); }", "for(;k<times(2,n);++k){s=times(s,counted_dot(u,v));}"),
+    ("vec2 p = vec2(4 * t.x, 1.5e-3 / z), q = p;", "vec2p=vec2(times(4,t.x),over(1.5e-3,z)),q=p;"),
+], ids=str)  # fmt: skip
+def test_products_become_calls_that_count(code, expected):
+    text = papers_counts.Rewriter(f"const float K = 1.0 / 64.0;\nvoid f() {{ {code} }}").rewritten()
+    found = "".join(text.split("\nvoid main")[0].split())
+    assert found == "constfloatK=1.0/64.0;voidf(){" + expected + "}"
+
+
+def test_multiplications_are_those_of_the_shaders():
+    """By hand: 25 a vertex; 18 a corner and 19 a triangle to set it up; the same in every view, or once for all."""
+    need_device()
+    for views in (1, 6):
+        one, covered = papers_counts.count(views, "plane-rasterizer")
+        many, same = papers_counts.count(views, "plane-rasterizer-n-pass")
+        assert covered == same > 100 * views
+        for counts, times in ((one, 1), (many, views)):
+            assert counts["plane_vertex.comp"] == times * 3 * (16 + 9)
+            assert counts["plane_setup.comp"] == times * (3 * 18 + 6 + 2 * 5 + 3)
+        for stage in ("plane_fine.comp", "plane_encode.comp"):
+            assert one[stage] == many[stage]
+        assert one["plane_fine.comp"] == 2 * 13 * covered  # twice: 11 for the plane of depths, 2 for a depth
+
+
+def test_one_more_multiplication_in_a_shader_is_counted():
+    need_device()
+
+    class Changed(papers_counts.CountingPrograms):
+        def text(self, name, defines, version):
+            text = super().text(name, defines, version)
+            for place in ("uint flags = ", "uvec4 entry = "):  # in setup and in the fine rasteriser
+                text = text.replace(place, f"depth_range * 2.0;\n    {place}", 1)
+            return text
+
+    views = 3
+    for method, times in (("plane-rasterizer", 1), ("plane-rasterizer-n-pass", views)):
+        usual, _ = papers_counts.count(views, method)
+        more, _ = papers_counts.count(views, method, Changed)
+        gained = {stage: more[stage] - usual[stage] for stage in usual if more[stage] != usual[stage]}
+        assert gained.pop("plane_setup.comp") == 4 * times  # four numbers, for each triangle that is set up
+        assert set(gained) == {"plane_fine.comp"} and gained["plane_fine.comp"] % 4 == 0
+
+
+def test_shaders_that_count_draw_the_same_picture():
+    device, scene = need_device(), Scene((displaced_sphere(2),))
+    way = Way("", SIZE, workloads.rig_for(scene, 5, SIZE), "plane-rasterizer")
+    expected = way.draw(Renderer(scene, "gl")).copy()
+    with device, programs_in_use(device, papers_counts.CountingPrograms(device)):
+        counts = device.ctx.buffer(bytes(4 * len(papers_counts.STAGES)))
+        counts.bind_to_storage_buffer(papers_counts.BINDING)
+        np.testing.assert_array_equal(way.draw(Renderer(scene, "gl")), expected)
+        assert np.frombuffer(counts.read(), np.uint32).min() > 0

@@ -23,7 +23,6 @@ from agreement.helpers import (
 )
 from agreement.test_mesh_agreement import DISPLAYS, integers
 from autostereo.engines.gl import plane_buffers, plane_rasterizer
-from autostereo.engines.gl.plane_counts import multiplications
 from autostereo.engines.gl.programs import expand
 from gl_device import need_device
 
@@ -317,14 +316,3 @@ def test_no_scene_data_is_sent_after_the_first_frame(device):
     renderer.render_views(RIG, SIZE, method=METHOD)
     renderer.render(DISPLAYS["looking glass"], method=METHOD)
     assert device.uploaded == before
-
-
-def test_multiplications_are_counted():
-    """By hand: 9 + 6 to set a corner and a view up, and so on; the more pixels, the less is left to share."""
-    triangle, lens = [(0.013, 0.007, 4), (0.1, 0.021, 4.2), (0.02, 0.11, 4.1)], (862.0, 862.0, 0.25)
-    many, one, covered = multiplications(triangle, np.linspace(-0.6, 0.6, 12), lens)
-    assert covered > 12 and many > one
-    corner = 6  # 1/d, two for x, two for y, one for parallax
-    assert many - one == 11 * 3 * corner
-    only = multiplications(triangle, [0.0], lens)
-    assert only[0] == only[1] and only[0] > only[2] * (2 + 3 + 1 + 3 * 9)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from . import papers_data, papers_mesh, papers_plane, papers_varyings, papers_volume
+from . import papers_counts, papers_data, papers_mesh, papers_plane, papers_varyings, papers_volume
 from .harness import machine_facts
 from .papers_published import ILLUMINATION_2008, PASSES_2008, SOURCES, VIEWS_2008, VOLUMES_512
 from .papers_studio import PapersStudio
@@ -67,7 +67,7 @@ WORKS: dict[str, Work[PapersStudio]] = {
         "2020 section 4.3: triangles begin with different views", papers_plane.staggered, tuple(papers_plane.STAGGERED)
     ),
     "2020-multiplications": Work(
-        "2020 section 3: multiplications", papers_plane.multiplications, ("1 view", "8 views", "48 views")
+        "2020 section 3: multiplications", papers_counts.multiplications, ("1 view", "8 views", "48 views")
     ),
     "uploads": Work("what a frame sends", papers_plane.uploads, ("volume", "points", "mesh")),
     "alpha": Work("what approximations lose", papers_volume.alpha, VOLUMES[:3]),

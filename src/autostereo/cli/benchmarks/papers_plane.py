@@ -6,22 +6,19 @@ import math
 import statistics
 from dataclasses import replace
 
-import numpy as np
-
 from ...display.display import Display
 from ...engines.options import Options
 from ...scene.scene import Scene
 from . import papers_data, workloads
 from .harness import Bar, Figure
 from .papers_data import Subject
-from .papers_published import FASTER_FROM_2020, HEADLINE_2020, MULTIPLICATIONS_2020
+from .papers_published import FASTER_FROM_2020, HEADLINE_2020
 from .papers_studio import CPU, PapersStudio, Way, noted, on_cpu
 from .volume import psnr
 
 ONE, N_TIMES, STAGGER = "plane-rasterizer", "plane-rasterizer-n-pass", "plane-rasterizer-staggered"
 TRIANGLES = "single-pass by triangles"  # that the device rasterises
 PANEL = (1024, 768)
-ATTRIBUTES = 9
 REFERENCES = (2, 4)  # views that are drawn, and others warped from
 MDIBR = "drawn by gl, read back, warped on the CPU; the paper's chart has no printed values"
 NONE = Bar(0, at_least=False)
@@ -151,23 +148,6 @@ def headline(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
     note = f"panel {size[0]}×{size[1]}, {len(workloads.the_mesh(subject.scene).vertices)} vertices"
     note += f"; 1/16 of the pixels without a GPU, --only {work} for all" if scaled else "; the paper: more than"
     return [noted(figure, note) for figure in row.rates()]
-
-
-def multiplications(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
-    """2020, section 3: multiplications a sample, counted while the formulas run."""
-    from ...engines.gl.plane_counts import multiplications as count
-
-    views = int(name.split()[0])
-    triangle = ((-0.1, -0.1, 2.0), (0.1, -0.08, 2.1), (0.0, 0.12, 1.9))
-    offsets = np.linspace(-0.3, 0.3, views) if views > 1 else np.zeros(1)
-    many, one, covered = count(triangle, offsets.tolist(), (200.0, 200.0, 0.5), ATTRIBUTES)
-    alone, each, shared = MULTIPLICATIONS_2020
-    note = f"{covered / views:.0f} samples a view, {ATTRIBUTES} attributes; every sample is evaluated, not stepped to"
-    values = {"view by view": (many / covered, alone), "in one pass": (one / covered, each + shared / views)}
-    return [
-        Figure("2020-multiplications", called, value, value, value, "a sample", name, note=note, published=paper)
-        for called, (value, paper) in values.items()
-    ]
 
 
 def uploads(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:

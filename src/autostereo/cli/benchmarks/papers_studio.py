@@ -7,8 +7,8 @@ in between; the wait at the end is timed. The cpu engine's pictures are in memor
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +27,7 @@ from .workloads import Size
 
 if TYPE_CHECKING:
     from ...engines.gl.context import Device
+    from ...engines.gl.programs import Programs
     from ...render import Renderer
 
 FRAMES = 3  # in a row at least: threads of software OpenGL are idle at the end of a lone one
@@ -202,6 +203,16 @@ class PapersStudio:
 
 def _nothing() -> None:
     pass
+
+
+@contextmanager
+def programs_in_use(device: Device, programs: Programs) -> Iterator[None]:
+    """Draw with other programs than the device's own meanwhile."""
+    usual, device.programs = device.programs, programs
+    try:
+        yield
+    finally:
+        device.programs = usual
 
 
 def on_cpu(way: Way, name: str = CPU) -> Way:

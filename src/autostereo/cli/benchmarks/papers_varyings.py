@@ -21,7 +21,7 @@ from . import papers_data, workloads
 from .harness import Figure
 from .papers_mesh import VIEW_2008
 from .papers_published import GEOMETRY, VARYINGS_2008
-from .papers_studio import CPU, PapersStudio, Way, on_cpu
+from .papers_studio import CPU, PapersStudio, Way, on_cpu, programs_in_use
 
 NUMBERS = (13, 14, 16, 24)
 FILES = ("mesh_points.vert", "mesh.geom", "mesh.frag")
@@ -112,11 +112,8 @@ class Handing(Way):
     def draw(self, renderer: Renderer, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
         """Draw a frame."""
         device = get_device()
-        usual, device.programs = device.programs, programs_of(device, self.numbers)
-        try:
+        with programs_in_use(device, programs_of(device, self.numbers)):
             return super().draw(renderer, out)
-        finally:
-            device.programs = usual
 
 
 def varyings(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
