@@ -85,7 +85,7 @@ def rates_by_views(studio: PapersStudio, name: str, lighting: str) -> list[Figur
         ways.append(Way(N_TIMES, display, rig, N_TIMES))
     row = studio.row(work, name, subject, ways)
     if left_out:
-        row.refused[N_TIMES] = f"left out without a GPU; --only {work} measures it"
+        row.refused[N_TIMES] = f"left out without a GPU; measured where {work} is named"
     bar = None if left_out or views < 8 else Bar(3.0) if views >= 48 else Bar(1.0)
     note = f"same pipeline, view by view; the paper: ahead above {FASTER_FROM_2020} views"
     return [*row.rates(), row.ratio(N_TIMES, ONE, bar, note)]
@@ -146,7 +146,7 @@ def headline(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
     published = {} if scaled else {views.name: HEADLINE_2020}
     row = studio.row(work, name, subject, ways, published)
     note = f"panel {size[0]}×{size[1]}, {len(workloads.the_mesh(subject.scene).vertices)} vertices"
-    note += f"; 1/16 of the pixels without a GPU, --only {work} for all" if scaled else "; the paper: more than"
+    note += "; 1/16 of the pixels without a GPU, all where the work is named" if scaled else "; the paper: more than"
     return [noted(figure, note) for figure in row.rates()]
 
 

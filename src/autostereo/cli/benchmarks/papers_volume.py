@@ -70,7 +70,7 @@ def table_1900(studio: PapersStudio, name: str, lighting: str) -> list[Figure]:
     """2007a, Table 2: 8 views at 1900×1200, with small views scaled up."""
     work = "2007a-table2"
     if name != BUCKY and studio.too_slow(work):
-        studio.say(f"left out without a GPU: {work}, {name}; --only {work} measures it")
+        studio.say(f"left out without a GPU: {work}, {name}; measured where the work is named")
         return []
     subject = papers_data.volume(studio.options, name)
     size = studio.size(1900, 1200)
@@ -92,7 +92,7 @@ def chart_stereo(studio: PapersStudio, name: str, lighting: str) -> list[Figure]
     """2007a, Chart 2: two views at 512×512 in per cent of the single view, with early z of 1, 2, 4 pixels a view."""
     work = "2007a-chart2"
     if name in (ENGINE, SKULL) and studio.too_slow(work):
-        studio.say(f"left out without a GPU: {work}, {name}; --only {work} measures it")
+        studio.say(f"left out without a GPU: {work}, {name}; measured where the work is named")
         return []
     subject = papers_data.volume(studio.options, name)
     size = studio.size(512, 512)
