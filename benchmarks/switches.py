@@ -20,7 +20,7 @@ def main(name: str, description: str | None) -> None:
     parser.add_argument("--repeats", type=int, help="rounds (7)")
     parser.add_argument("--json", type=Path, help="also write the numbers here")
     if name == "papers":
-        parser.add_argument("--data", type=Path, help="folder with volumes/neghip.json …")
+        parser.add_argument("--data", type=Path, help="folder with meshes/…, volumes/…")
         parser.add_argument("--budget", type=float, help="seconds after which no work is begun")
         parser.add_argument("--plots", type=Path, help="folder for charts")
     else:

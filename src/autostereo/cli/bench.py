@@ -31,7 +31,7 @@ def bench(
     ] = None,
     data: Annotated[
         Path | None,
-        typer.Option("--data", metavar="DIR", help="Folder with meshes/bun_zipper.ply (mesh), volumes/… (papers)."),
+        typer.Option("--data", metavar="DIR", help="Folder with meshes/… (mesh, papers), volumes/… (papers)."),
     ] = None,
     budget: Annotated[
         float | None, typer.Option("--budget", metavar="SECONDS", help="Begin no work any more after this time.")
