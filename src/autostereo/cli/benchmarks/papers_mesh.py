@@ -59,7 +59,8 @@ def chart_immediate(studio: PapersStudio, name: str, lighting: str) -> list[Figu
     ]
     indexed = [replace(way, name=f"{way.name}, {INDEXED}") for way in ways]
     row = studio.row("2007b-immediate", name, subject, [*(replace(way, scene=own) for way in ways), *indexed])
-    shares = [row.percent(way.name, SV, claims[MV if way.name == MV else GPU_MV]) for way in ways[1:4]]
+    multi, *single = (row.percent(way.name, SV, claims[MV if way.name == MV else GPU_MV]) for way in ways[1:4])
+    shares = [multi, *(noted(figure, "the paper: at least") for figure in single)]
     pairs = zip(ways, indexed, strict=True)
     gains = [row.ratio(way.name, other.name, note="times the time") for way, other in pairs]
     return [
