@@ -16,11 +16,11 @@ def main(name: str, description: str | None) -> None:
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--quick", action="store_true", help="small pictures, three rounds, no bars")
     works = list(report.SUITES[name].WORKS)
-    parser.add_argument("--only", action="append", default=[], choices=works, help="may be repeated")
+    parser.add_argument("only", nargs="*", metavar="WORK", help=f"only these: {', '.join(works)}")
     parser.add_argument("--repeats", type=int, help="rounds (7)")
     parser.add_argument("--json", type=Path, help="also write the numbers here")
     if name == "papers":
-        parser.add_argument("--data", type=Path, help="folder with volumes/neghip.json …")
+        parser.add_argument("--data", type=Path, help="folder with meshes/…, volumes/…")
         parser.add_argument("--budget", type=float, help="seconds after which no work is begun")
         parser.add_argument("--plots", type=Path, help="folder for charts")
     else:

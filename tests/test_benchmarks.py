@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib.util
 import itertools
 import json
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -305,3 +307,21 @@ def test_our_pictures_are_the_peers_pictures():
         pytest.skip("no peer")
     for figure in results:
         assert figure["value"] < 1.0, figure["measure"]  # per cent, silhouettes only
+
+
+@pytest.mark.parametrize("name", ["mesh", "volume", "points", "papers"])
+def test_scripts_take_works_as_the_command_does(monkeypatch, name):
+    """benchmarks/switches.py: names after the script, and no other way."""
+    path = Path(__file__).parents[1] / "benchmarks" / "switches.py"
+    spec = importlib.util.spec_from_file_location("switches", path)
+    switches = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(switches)
+    asked = []
+    monkeypatch.setattr(report, "bench", lambda name, options, path: asked.append((name, options.only)))
+    works = list(report.SUITES[name].WORKS)[:2]
+    monkeypatch.setattr(sys, "argv", [f"{name}.py", *works, "--quick"])
+    switches.main(name, "")
+    assert asked == [(name, tuple(works))]
+    monkeypatch.setattr(sys, "argv", [f"{name}.py", "--only", works[0]])
+    with pytest.raises(SystemExit):
+        switches.main(name, "")

@@ -13,6 +13,7 @@ from autostereo import Display, Material, Mesh, Options, Points, Rig, Scene, Vie
 from autostereo import TransferFunction as Transfer
 from autostereo.engines.engine import Draw
 from autostereo.engines.reference.engine import panel_samples
+from autostereo.errors import InputError
 from autostereo.render import render, render_views
 from autostereo.transforms import rotation, translation
 from eye_scenes import FLAT, bumpy_plane, colourful, draw_panel, draw_views, quad
@@ -259,3 +260,22 @@ def test_every_method_draws_the_same_through_the_front_door():
     np.testing.assert_array_equal(panels[0], panels[1])
     subsampled = render(scene, display, rig, method="n-pass-subres", engine="reference").pixels
     assert subsampled.shape == panels[0].shape and np.ptp(subsampled) > 50
+
+
+@pytest.mark.parametrize("engine", ["reference", "cpu"])
+def test_small_views_are_of_the_size_asked_for(engine):
+    """Views of the panel's own size lose nothing; of one pixel, all there was; the default divides by √V."""
+    scene, display = Scene((leaning(), wall(3, RED, 0.5))), Display.lenticular(24, 20, 4)
+    rig = Rig(position=(0, 0, 0), target=(0, 0, -4), views=4)
+
+    def panel(method="n-pass-subres", **options):
+        return render(scene, display, rig, method=method, engine=engine, options=Options(**options)).pixels
+
+    np.testing.assert_array_equal(panel(small_size=(24, 20)), panel("n-pass"))
+    np.testing.assert_array_equal(panel(small_size=(12, 10)), panel())
+    assert np.ptp(panel(small_size=(1, 1))) <= np.ptp(panel(small_size=(6, 5)))
+    with pytest.raises(InputError, match="small_size: expected at most the panel's 24×20, got 25×1"):
+        panel(small_size=(25, 1))
+    for wrong in ((0, 4), (4,), [4, 4], (4, 4.0), 4, (True, 4)):
+        with pytest.raises(InputError, match="small_size: expected two whole numbers ≥ 1"):
+            Options(small_size=wrong)

@@ -294,9 +294,11 @@ def test_painting_has_no_more_views_a_pass_than_targets():
 def test_small_views_are_woven_as_on_the_cpu(name):
     scene, display = SCENES["smooth"][0], DISPLAYS[name]
     rig = RIG.with_views(display.views)
-    found = render(scene, display, "n-pass-subres").astype(int)
-    expected = aus.render(scene, display, rig, method="n-pass-subres", engine="cpu").pixels
-    assert (np.abs(found - expected) > 1).mean() <= 0.02
+    for size in (None, (23, 19)):
+        found = render(scene, display, "n-pass-subres", small_size=size).astype(int)
+        options = aus.Options(small_size=size)
+        expected = aus.render(scene, display, rig, method="n-pass-subres", engine="cpu", options=options).pixels
+        assert (np.abs(found - expected) > 1).mean() <= 0.02
 
 
 # --- what reaches the device ---------------------------------------------------------------------------

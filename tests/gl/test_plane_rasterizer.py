@@ -23,7 +23,7 @@ from agreement.helpers import (
 )
 from agreement.test_mesh_agreement import DISPLAYS, integers
 from autostereo.engines.gl import plane_buffers, plane_rasterizer
-from autostereo.engines.gl.plane_counts import multiplications
+from autostereo.engines.gl.programs import expand
 from gl_device import need_device
 
 W, H = SIZE
@@ -110,6 +110,7 @@ def test_random_meshes(data):
     display = aus.Display.lenticular(W, H, rig.views, per="subpixel")
     woven = aus.interlace(found, display)
     np.testing.assert_array_equal(panel(scene, display, rig), getattr(woven, "pixels", woven))
+    np.testing.assert_array_equal(panel(scene, display, rig, "plane-rasterizer-staggered"), panel(scene, display, rig))
     expected = views(scene, rig, "n-pass", engine="reference")
     inside = interior_of_views(scene, rig, SIZE, 1, "triangle")
     difference = np.abs(found.color.astype(int) - expected.color).max(axis=-1)
@@ -257,6 +258,40 @@ def test_rounds_cover_the_picture_once():
         assert all(part.rows <= 4 or part.tiles * max(16 * planes, blocks) <= most for part in parts)
 
 
+# --- the order of views (section 4.3) ---------------------------------------------------------------------
+
+ORDER = """
+#include "lib/plane_order.glsl"
+layout(local_size_x = 1) in;
+layout(std430, binding = 0) buffer Result { uint order[]; };
+void main() {
+    uint number = gl_GlobalInvocationID.x, begin = first_plane(number);
+    uvec2 all = uvec2(0xffffffffu, PLANES == 4u ? 0xffffffffu : 0xffffu), mask = turned(all, begin);
+    for (uint k = 0u; mask != uvec2(0u); ++k) {
+        order[64u * number + k] = uint(next_turned(mask, begin));
+    }
+}
+"""
+
+
+@pytest.mark.parametrize("on_panel", [False, True], ids=["views", "panel"])
+def test_staggered_triangles_change_different_samples_of_a_tile(device, on_panel):
+    """Triangles one after the other begin with different views, or channels; each changes every sample once."""
+    planes = 3 if on_panel else 4
+    for stagger in (False, True):
+        defines = {"PANEL": on_panel, "STAGGER": stagger}
+        with device:
+            program = device.programs.compile({"order.comp": expand(ORDER, defines, plane_rasterizer.VERSION)})
+            found = device.ctx.buffer(reserve=4 * 64 * planes)
+            found.bind_to_storage_buffer(0)
+            program.run(planes)
+            device.ctx.finish()
+            order = np.frombuffer(found.read(), np.uint32).reshape(planes, 64)[:, : 16 * planes]
+        assert (np.sort(order, axis=1) == np.arange(16 * planes)).all()
+        at_a_time = [len(set(order[:, k])) for k in range(16 * planes)]
+        assert set(at_a_time) == {planes if stagger else 1}
+
+
 # --- the device, and figures -----------------------------------------------------------------------------
 
 
@@ -281,14 +316,3 @@ def test_no_scene_data_is_sent_after_the_first_frame(device):
     renderer.render_views(RIG, SIZE, method=METHOD)
     renderer.render(DISPLAYS["looking glass"], method=METHOD)
     assert device.uploaded == before
-
-
-def test_multiplications_are_counted():
-    """By hand: 9 + 6 to set a corner and a view up, and so on; the more pixels, the less is left to share."""
-    triangle, lens = [(0.013, 0.007, 4), (0.1, 0.021, 4.2), (0.02, 0.11, 4.1)], (862.0, 862.0, 0.25)
-    many, one, covered = multiplications(triangle, np.linspace(-0.6, 0.6, 12), lens)
-    assert covered > 12 and many > one
-    corner = 6  # 1/d, two for x, two for y, one for parallax
-    assert many - one == 11 * 3 * corner
-    only = multiplications(triangle, [0.0], lens)
-    assert only[0] == only[1] and only[0] > only[2] * (2 + 3 + 1 + 3 * 9)

@@ -23,16 +23,15 @@ def bench(
         str, typer.Argument(metavar="WHAT", help="What to measure: mesh, volume, points or papers.")
     ] = "mesh",
     works: Annotated[
-        list[str] | None, typer.Argument(metavar="WORK", help="Only these, as --only.", show_default=False)
+        list[str] | None, typer.Argument(metavar="WORK", help="Only these works.", show_default=False)
     ] = None,
     json: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Also write the figures here.")] = None,
-    only: Annotated[list[str] | None, typer.Option("--only", metavar="WORK", help="Only this; repeatable.")] = None,
     repeats: Annotated[
         int | None, typer.Option("--repeats", metavar="N", help="Rounds; 7, or 3 with --quick; papers: 3, 1.")
     ] = None,
     data: Annotated[
         Path | None,
-        typer.Option("--data", metavar="DIR", help="Folder with meshes/bun_zipper.ply (mesh), volumes/… (papers)."),
+        typer.Option("--data", metavar="DIR", help="Folder with meshes/… (mesh, papers), volumes/… (papers)."),
     ] = None,
     budget: Annotated[
         float | None, typer.Option("--budget", metavar="SECONDS", help="Begin no work any more after this time.")
@@ -53,7 +52,7 @@ def bench(
     Examples:
       autostereo bench mesh --quick
       autostereo bench mesh --data data --json bench.json
-      autostereo bench volume --only views-48 --only panels-8 --repeats 15
+      autostereo bench volume views-48 panels-8 --repeats 15
       autostereo bench points
       autostereo bench papers 2007a-table1 2007b-points --json papers.json --plots charts
     """
@@ -66,7 +65,7 @@ def bench(
     from .benchmarks import report
     from .benchmarks.suite import BenchOptions
 
-    options = BenchOptions(quick=quick, only=(*(works or ()), *(only or ())), data=data, repeats=repeats, budget=budget)
+    options = BenchOptions(quick=quick, only=tuple(works or ()), data=data, repeats=repeats, budget=budget)
     common.announce_compilation("cpu", *KERNELS[name])
     results = report.bench(name, options, json, common.note)
     if plots is not None:

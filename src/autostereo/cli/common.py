@@ -92,6 +92,9 @@ Alpha = Annotated[str, typer.Option("--alpha", help="exact, or averaged or minim
 PerPass = Annotated[
     int | None, typer.Option("--views-per-pass", metavar="N", help="geometry-shader: views that one pass draws.")
 ]
+SmallSize = Annotated[
+    str | None, typer.Option("--small-size", metavar="WxH", help="n-pass-subres: size of its small views.")
+]
 Groups = Annotated[int, typer.Option("--groups", metavar="K", help="Points by covering-quad, alpha averaged: groups.")]
 References = Annotated[int, typer.Option("--references", metavar="R", help="dibr: how many of the views are drawn.")]
 Side = Annotated[

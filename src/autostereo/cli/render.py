@@ -39,6 +39,7 @@ def render(
     volume: common.Rays = "shared",
     alpha: common.Alpha = "exact",
     views_per_pass: common.PerPass = None,
+    small_size: common.SmallSize = None,
     groups: common.Groups = 8,
     references: common.References = 2,
     quiet: common.Quiet = False,
@@ -62,6 +63,7 @@ def render(
     options = Options(
         shading=shading, lighting=lighting, sampling=sampling, samples=samples, step=step, volume=volume, alpha=alpha,
         views_per_pass=views_per_pass, groups=groups, references=references,
+        small_size=None if small_size is None else common.parse_size(small_size, "--small-size"),
     )  # fmt: skip
     volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
     common.check_side(side, camera)

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UnsupportedError
+from ..errors import InputError, UnsupportedError
 from ..scene.scene import Scene
 from ..viewmap import ViewMap
 from .options import Options
@@ -75,6 +75,25 @@ class Draw:
     def pixels(self) -> int:
         """Pixels of one view, or of the panel."""
         return self.camera.width * self.camera.height
+
+
+def small_camera(draw: Draw) -> Camera:
+    """The camera of a panel's small views, which are scaled up: method n-pass-subres. They are sampled all over.
+
+    Raises
+    ------
+    InputError
+        `Options.small_size` is larger than the panel.
+    """
+    camera, side = draw.camera, len(draw.offsets) ** 0.5
+    usual = max(1, round(camera.width / side)), max(1, round(camera.height / side))
+    width, height = draw.options.small_size or usual
+    if width > camera.width or height > camera.height:
+        most = f"{camera.width}×{camera.height}"
+        raise InputError(f"options small_size: expected at most the panel's {most}, got {width}×{height}")
+    x, y = width / camera.width, height / camera.height
+    shift = camera.shift[0] * x, camera.shift[1] * y
+    return replace(camera, width=width, height=height, fx=camera.fx * x, fy=camera.fy * y, shift=shift, spread=1.0)
 
 
 @dataclass(eq=False)

@@ -43,6 +43,9 @@ class Options:
         For volumes.
     views_per_pass : int, optional
         Method geometry-shader: views that one pass draws; None: as many as the device can.
+    small_size : (int, int), optional
+        Method n-pass-subres: width and height of its small views, at most the panel's; None: the panel's, each
+        divided by √V, so that all views have as many pixels as the panel.
     groups : int
         Points by `covering-quad` on the OpenGL engine with an `alpha` that is not "exact": drawn once, in so many
         groups that each keep the nearest (Hübner 2007b, section 3.5.2). More lose fewer points; each costs a tile of
@@ -66,6 +69,7 @@ class Options:
     volume: str = "shared"
     step: float = 1.0
     views_per_pass: int | None = None
+    small_size: tuple[int, int] | None = None
     groups: int = 8
     references: int = 2
     proxy: str = "march"
@@ -87,11 +91,19 @@ class Options:
         whole = isinstance(lens, tuple) and len(lens) == 2 and all(type(n) is int and 1 <= n <= 64 for n in lens)
         if not whole:
             raise InputError(f"options lens: expected two whole numbers from 1 to 64, got {lens!r}")
+        small = self.small_size
+        if small is not None and not (isinstance(small, tuple) and len(small) == 2 and all(map(is_count, small))):
+            raise InputError(f"options small_size: expected two whole numbers ≥ 1, got {small!r}")
         if aperture and self.depth:
             raise InputError("options depth: means through a lens of some aperture have no one depth")
         for name in ("views_per_pass", "groups", "references"):
             value = getattr(self, name)
             if name == "views_per_pass" and value is None:
                 continue
-            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+            if not is_count(value):
                 raise InputError(f"options {name}: expected a whole number ≥ 1, got {value!r}")
+
+
+def is_count(value: object) -> bool:
+    """Whether it is a whole number ≥ 1."""
+    return type(value) is int and value >= 1

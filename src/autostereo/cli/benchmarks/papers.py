@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from . import papers_mesh, papers_plane, papers_volume
+from . import papers_counts, papers_data, papers_mesh, papers_plane, papers_varyings, papers_volume
 from .harness import machine_facts
 from .papers_published import ILLUMINATION_2008, PASSES_2008, SOURCES, VIEWS_2008, VOLUMES_512
 from .papers_studio import PapersStudio
@@ -46,20 +46,28 @@ WORKS: dict[str, Work[PapersStudio]] = {
         tuple(f"{views} views" for views in (8, 16, 48, 96)),
     ),
     "2007b-points": Work("2007b Chart 2: points", papers_mesh.chart_points, tuple(papers_mesh.POINTS)),
-    "2007b-triangles": Work("2007b Chart 3: triangles", papers_mesh.chart_triangles, tuple(papers_mesh.SUBDIVISIONS)),
-    "2007b-immediate": Work("2007b Chart 4: immediate mode", papers_mesh.chart_immediate),
+    "2007b-triangles": Work("2007b Chart 3: triangles", papers_mesh.chart_triangles, tuple(papers_data.MESHES)),
+    "2007b-immediate": Work(
+        "2007b Chart 4: immediate mode", papers_mesh.chart_immediate, tuple(papers_data.MESHES)
+    ),
     "2007a-chart2": Work("2007a Chart 2: stereo", papers_volume.chart_stereo, VOLUMES),
     "2020-headline": Work("2020: 96 views, a million vertices", papers_plane.headline, ("1M vertices",)),
     "2008-table3": Work("2008 Table 3: passes", papers_mesh.table_passes, tuple(PASSES_2008)),
     "2008-table2": Work("2008 Table 2: illumination", papers_mesh.table_illumination, tuple(ILLUMINATION_2008)),
+    "2008-varyings": Work(
+        "2008 section 5: numbers between stages, 240×180", papers_varyings.varyings, ("4 views", "8 views")
+    ),
     "2008-vertices": Work("8 views of 60×45, many vertices", papers_mesh.vertex_heavy, ("1.3M triangles",)),
     "2020-fig14": Work(
         "2020 Fig. 14: stages",
         papers_plane.stage_times,
         ("512×384, 16 views", "1024×768, 16 views", "1024×768, 48 views"),
     ),
+    "2020-stagger": Work(
+        "2020 section 4.3: triangles begin with different views", papers_plane.staggered, tuple(papers_plane.STAGGERED)
+    ),
     "2020-multiplications": Work(
-        "2020 section 3: multiplications", papers_plane.multiplications, ("1 view", "8 views", "48 views")
+        "2020 section 3: multiplications", papers_counts.multiplications, ("1 view", "8 views", "48 views")
     ),
     "uploads": Work("what a frame sends", papers_plane.uploads, ("volume", "points", "mesh")),
     "alpha": Work("what approximations lose", papers_volume.alpha, VOLUMES[:3]),

@@ -15,10 +15,13 @@ SOURCES = {
     "2020": "PMR 2020, Parallel multi-view polygon rasterization for 3D light field display; GeForce RTX 2080",
 }
 
-SV, MV, SUBRES, GPU_MV = "SV", "MV", "MV sub-res", "GPU-MV"
+SV, MV, GPU_MV = "SV", "MV", "GPU-MV"
+SUBRES_512, SUBRES_1900 = "MV sub-res 256×256", "MV sub-res 512×512"  # by the size of a panel: of its small views
 BUCKY, NEGHIP, HYDROGEN, ENGINE, SKULL = (
     "Buckyball 32³", "Neghip 64³", "Hydrogen 128³", "Engine 256³", "Skull 256³"
 )  # fmt: skip
+
+BUNNY, DRAGON = "Bunny 69k", "Dragon 100k"  # meshes that 2007b's charts may have had: its data are Stanford's
 
 VOLUMES_512: Table = {  # 2007a, Table 1: 512×512, 8 views
     BUCKY: {SV: 463, MV: 51, GPU_MV: 128},
@@ -28,13 +31,13 @@ VOLUMES_512: Table = {  # 2007a, Table 1: 512×512, 8 views
     SKULL: {SV: 15, MV: 1.8, GPU_MV: 7.8},
 }
 VOLUMES_1900: Table = {  # 2007a, Table 2: 1900×1200, 8 views
-    BUCKY: {SV: 116, MV: 12.8, SUBRES: 39, GPU_MV: 26.6},
-    NEGHIP: {SV: 58.8, MV: 6.8, SUBRES: 25.6, GPU_MV: 11.9},
-    HYDROGEN: {SV: 24.8, MV: 3.3, SUBRES: 10.5, GPU_MV: 5.5},
-    ENGINE: {SV: 6.4, MV: 0.9, SUBRES: 1.9, GPU_MV: 2.1},
-    SKULL: {SV: 5.9, MV: 0.8, SUBRES: 1.8, GPU_MV: 2},
+    BUCKY: {SV: 116, MV: 12.8, SUBRES_1900: 39, GPU_MV: 26.6},
+    NEGHIP: {SV: 58.8, MV: 6.8, SUBRES_1900: 25.6, GPU_MV: 11.9},
+    HYDROGEN: {SV: 24.8, MV: 3.3, SUBRES_1900: 10.5, GPU_MV: 5.5},
+    ENGINE: {SV: 6.4, MV: 0.9, SUBRES_1900: 1.9, GPU_MV: 2.1},
+    SKULL: {SV: 5.9, MV: 0.8, SUBRES_1900: 1.8, GPU_MV: 2},
 }
-SUBRES_512: Table = {ENGINE: {GPU_MV: 8.3, MV: 1.9, SUBRES: 3}}  # 2007a, Fig. 6: sub-res 256×256 at 512×512
+FIGURE_6: Table = {ENGINE: {GPU_MV: 8.3, MV: 1.9, SUBRES_512: 3}}  # 2007a, 512×512
 
 CHART_CLAIMS: Table = {  # per cent of the single view, as the text of 2007a and 2007b has them
     "8 views": {MV: 100 / 8, GPU_MV: 100 / 3},
@@ -57,6 +60,7 @@ ILLUMINATION_2008: Table = {  # 2008, Table 2
 PASSES_2008: Table = {  # 2008, Table 3: 12 views in so many passes; one pass: N/A
     "12 views": {"2 passes": 14, "3 passes": 15, "4 passes": 23, "6 passes": 21, N_PASS: 14}
 }
+VARYINGS_2008 = (13, 14, 2.0, 4)  # section 5: from 13 to 14 numbers doubles the time, in the 4-view case
 HEADLINE_2020 = 60.0  # fps, "more than", panel 7680×4320, 96 views of 1024×512, 1 M vertices
 FASTER_FROM_2020 = 10  # views from which Fig. 15 has the one pass ahead
 MULTIPLICATIONS_2020 = (38.0, 8.0, 30.0)  # section 3: 38·m·n view by view, 8·m·n + 30·m in one pass

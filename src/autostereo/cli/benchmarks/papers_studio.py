@@ -7,8 +7,8 @@ in between; the wait at the end is timed. The cpu engine's pictures are in memor
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -21,11 +21,13 @@ from ...engines.options import Options
 from ...errors import AutostereoError, UnsupportedError
 from ...scene.scene import Scene
 from .harness import Bar, Contender, Figure, Times, band, measure, ratio
+from .papers_data import Subject
 from .suite import BenchOptions, Say
 from .workloads import Size
 
 if TYPE_CHECKING:
     from ...engines.gl.context import Device
+    from ...engines.gl.programs import Programs
     from ...render import Renderer
 
 FRAMES = 3  # in a row at least: threads of software OpenGL are idle at the end of a lone one
@@ -45,6 +47,8 @@ class Way:
     rig : Rig
     method, engine : str
     options : Options
+    scene : Scene, optional
+        Another than its row's.
     """
 
     name: str
@@ -53,6 +57,7 @@ class Way:
     method: str = "single-pass"
     engine: str = "gl"
     options: Options = field(default_factory=Options)
+    scene: Scene | None = None
 
     def draw(self, renderer: Renderer, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
         """Draw a frame."""
@@ -67,6 +72,7 @@ class Row:
 
     work: str
     scene: str
+    data: str
     times: dict[str, Times]
     refused: dict[str, str]
     published: Mapping[str, float]
@@ -83,6 +89,12 @@ class Row:
             for name, reason in self.refused.items()
         ]
 
+    def milliseconds(self, name: str) -> Figure:
+        """A frame's time."""
+        spent = self.times.get(name)
+        value = (math.nan,) * 3 if spent is None else band(lambda seconds: 1e3 * seconds, spent)
+        return self._figure(name, value, "ms", note=self.refused.get(name, ""))
+
     def ratio(self, slow: str, fast: str, bar: Bar | None = None, note: str = "") -> Figure:
         """How many times faster `fast` is, beside the paper's figure if it has both."""
         rates = self.published
@@ -94,13 +106,13 @@ class Row:
     def percent(self, name: str, single: str, published: float | None = None) -> Figure:
         """Frame rate in per cent of the single view's."""
         found = self.ratio(single, name)
-        value = 100 * found.value, 100 * found.low, 100 * found.high
         paper = 100 * found.published if found.published is not None else published
-        return self._figure(f"{name} of {single}", value, "%", note=found.note, published=paper)
+        shares = {part: 100 * getattr(found, part) for part in ("value", "low", "high")}
+        return replace(found, measure=f"{name} of {single}", unit="%", published=paper, **shares)
 
     def _figure(self, name: str, value: Sequence[float], unit: str, **rest: Any) -> Figure:
         low, high = min(value[1:]), max(value[1:])
-        return Figure(self.work, name, value[0], low, high, unit, self.scene, **rest)
+        return noted(Figure(self.work, name, value[0], low, high, unit, self.scene, **rest), self.data)
 
 
 class PapersStudio:
@@ -109,8 +121,8 @@ class PapersStudio:
     def __init__(self, options: BenchOptions, say: Say) -> None:
         self.options = options
         self.say = say
-        self._scene: Scene | None = None
-        self._renderers: dict[str, Renderer] = {}
+        self._scenes: list[Scene] = []
+        self._renderers: dict[tuple[int, str], Renderer] = {}
 
     @property
     def device(self) -> Device | None:
@@ -132,23 +144,31 @@ class PapersStudio:
         return slow and not self.options.quick and work not in self.options.only
 
     def renderer(self, scene: Scene, engine: str) -> Renderer:
-        """The scene's renderer; those of the scene before are let go."""
+        """A scene's renderer; those of a row before are let go."""
         from ...render import Renderer
 
-        if scene is not self._scene:
-            self._scene, self._renderers = scene, {}
-        if engine not in self._renderers:
-            self._renderers[engine] = Renderer(scene, engine)
-        return self._renderers[engine]
+        if not any(scene is one for one in self._scenes):
+            self._begin([scene])
+        key = id(scene), engine
+        if key not in self._renderers:
+            self._renderers[key] = Renderer(scene, engine)
+        return self._renderers[key]
+
+    def _begin(self, scenes: list[Scene]) -> None:
+        """Keep no more than these."""
+        here = {id(scene) for scene in scenes}
+        self._scenes = scenes
+        self._renderers = {key: kept for key, kept in self._renderers.items() if key[0] in here}
 
     def row(
-        self, work: str, name: str, scene: Scene, ways: Sequence[Way], published: Mapping[str, float] | None = None
+        self, work: str, name: str, subject: Subject, ways: Sequence[Way], published: Mapping[str, float] | None = None
     ) -> Row:
         """Try every way, then measure those that draw, in turns."""
         contenders, refused = [], {}
+        self._begin([subject.scene, *(way.scene for way in ways if way.scene is not None)])
         for way in ways:
             try:
-                contenders.append(self._contender(scene, way))
+                contenders.append(self._contender(way.scene or subject.scene, way))
             except AutostereoError as error:
                 refused[way.name] = f"not available: {error}"
             except Exception as error:  # a driver's: one table less, not the end
@@ -157,7 +177,7 @@ class PapersStudio:
         minimum, least = (0.0, 1) if self.options.quick else (0.1, FRAMES)
         with self.device.without_reading() if self.device is not None else nullcontext():
             times = measure(contenders, repeats, minimum, least, LIMIT, warm=True)
-        return Row(work, name, times, refused, published or {})
+        return Row(work, name, subject.words, times, refused, published or {})
 
     def picture_or_why(self, scene: Scene, way: Way) -> tuple[NDArray[np.uint8] | None, str]:
         """A frame, read back, of its own memory; or why there is none."""
@@ -185,11 +205,21 @@ def _nothing() -> None:
     pass
 
 
+@contextmanager
+def programs_in_use(device: Device, programs: Programs) -> Iterator[None]:
+    """Draw with other programs than the device's own meanwhile."""
+    usual, device.programs = device.programs, programs
+    try:
+        yield
+    finally:
+        device.programs = usual
+
+
 def on_cpu(way: Way, name: str = CPU) -> Way:
     """The same in a single pass of the cpu engine."""
     return replace(way, name=name, engine="cpu", method="single-pass")
 
 
-def noted(figures: list[Figure], note: str) -> list[Figure]:
-    """The figures, with a note where they have none."""
-    return [replace(figure, note=figure.note or note) for figure in figures]
+def noted(figure: Figure, words: str) -> Figure:
+    """The figure with one more note."""
+    return replace(figure, note="; ".join(note for note in (figure.note, words) if note))

@@ -28,7 +28,7 @@ class BenchOptions:
     only : tuple of str
         Names of works; empty: all.
     data : Path, optional
-        Folder with meshes/bun_zipper.ply, the Stanford bunny (mesh only).
+        Folder with meshes/bun_zipper.ply, the Stanford bunny (mesh); with meshes and volumes of the papers (papers).
     repeats : int, optional
         Rounds; None: 7, or 3 if quick.
     specular : float

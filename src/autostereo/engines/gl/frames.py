@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import UnsupportedError
-from ..engine import Target
+from ..engine import Target, small_camera
 from ..gathering import Tiles
 from .atlas import Atlas, Layout
 from .blocks import stored_background
@@ -228,19 +228,15 @@ def _gather_channels(job: Job, stages: list[Stage], panel: Panel, sample: tuple[
 
 def _weave_small(job: Job, stages: list[Stage], panel: Panel) -> None:
     """Small views, scaled up while they are woven (Hübner 2007a, section 2.3), as methods/n_pass_subres.py has it."""
-    camera, views = job.draw.camera, len(job.draw.offsets)
-    width, height = (max(1, round(side / views**0.5)) for side in panel.size)
     own = job.draw.options.sampling == "subpixel"
     panel.clear()
     for column, channels in [((1 - c) / 3, CHANNELS[c]) for c in range(3)] if own else [(0.0, ALL)]:
-        small = replace(
-            camera, width=width, height=height, fx=camera.fx * width / camera.width,
-            fy=camera.fy * height / camera.height, shift=(column * width / camera.width, 0.0),
-        )  # fmt: skip
+        moved = replace(job.draw, camera=replace(job.draw.camera, shift=(column, 0.0)))
+        small = small_camera(moved)
         for part in atlases(replace(job, draw=replace(job.draw, camera=small)), "small atlas"):
             _draw_samples(part, stages)
             layout = part.atlas.layout
-            tiles = Tiles(layout.columns, width, height, *layout.size, 4)
+            tiles = Tiles(layout.columns, small.width, small.height, *layout.size, 4)
             panel.weave(job, part.atlas.color, tiles, (part.first, part.count), channels)
 
 

@@ -14,7 +14,8 @@ room in the queue is rasterised where it was found; for the next frame the queue
 pieces. Pictures that are too large for a buffer are drawn in rounds of some rows.
 
 METHODS are variants: one pass; the same pipeline run with one view after the other; planes as the paper prints them,
-for comparison; triangles that begin with different views (section 4.3).
+for comparison; triangles that begin with different views of a tile, or channels of a panel's, so that those which
+cover it at one time do not change the same samples (section 4.3; lib/plane_order.glsl).
 """
 
 from __future__ import annotations

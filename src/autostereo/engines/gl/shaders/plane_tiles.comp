@@ -18,6 +18,7 @@
 #include "lib/plane_memory.glsl"
 #include "lib/plane_triangle.glsl"
 #include "lib/plane_pass.glsl"
+#include "lib/plane_order.glsl"
 #include "lib/plane_tile.glsl"
 #include "lib/plane_coverage.glsl"
 #include "lib/invocation.glsl"

@@ -2,10 +2,9 @@
 //
 // There are two rounds, as not every device has atomic operations of 64 bits: `find_depth` leaves the least depth in every
 // voxel, the next round the first triangle of that depth. Needs frame.glsl, plane_memory.glsl, plane_triangle.glsl,
-// plane_pass.glsl.
+// plane_pass.glsl, plane_order.glsl.
 //
-// Switches: PANEL: what counts are not voxels but the sub-pixels of a panel, each of which shows one camera; STAGGER: triangles
-// begin with different views, so that at one time they change different addresses (section 4.3).
+// Switch: PANEL: what counts are not voxels but the sub-pixels of a panel, each of which shows one camera.
 
 uniform bool find_depth;
 
@@ -56,16 +55,6 @@ void put(uint number, uint at, uint bits) {
     }
 }
 
-// The position of the lowest bit, which is taken away.
-int next_bit(inout uvec2 mask) {
-    bool low = mask.x != 0u;
-    uint word = low ? mask.x : mask.y;
-    int bit = findLSB(word);
-    word &= word - 1u;
-    mask = low ? uvec2(word, mask.y) : uvec2(0u, word);
-    return low ? bit : bit + 32;
-}
-
 #ifdef PANEL
 // A sub-pixel of a tile: bit c*16 + y*4 + x. Its number, its place, and its camera's offset.
 struct SubPixel {
@@ -84,8 +73,10 @@ SubPixel sub_pixel(ivec3 tile, int bit) {
 }
 
 void put_tile(Triangle t, ivec3 tile, uvec2 mask) {
+    uint begin = first_plane(t.info.x);
+    mask = turned(mask, begin);
     while (mask != uvec2(0u)) {
-        SubPixel s = sub_pixel(tile, next_bit(mask));
+        SubPixel s = sub_pixel(tile, next_turned(mask, begin));
         Depth d = depth_of(t, s.offset);
         if (!d.none) {
             put(t.info.x, s.number, depth_bits(d, s.place.x, s.place.y));
@@ -97,16 +88,10 @@ void put_tile(Triangle t, ivec3 tile, uvec2 mask) {
     vec4 offset = imageLoad(blocks, ivec2(0, pass_views.x + tile.z));
     vec2 corner = vec2(4 * tile.x, 4 * tile.y + first_row) + sample_at.xw;
     uint start = sample_number(4 * tile.xy, tile.z * pass_views.z, picture.x, plane_count);
-#ifdef STAGGER
-    uint turned = t.info.x & 3u;  // begin with this view: 16 bits each
-    mask = (turned & 2u) != 0u ? mask.yx : mask;
-    mask = (turned & 1u) != 0u ? (mask >> 16) | (mask.yx << 16) : mask;
-#endif
+    uint begin = first_plane(t.info.x);
+    mask = turned(mask, begin);
     while (mask != uvec2(0u)) {
-        int bit = next_bit(mask);
-#ifdef STAGGER
-        bit = (bit + 16 * int(turned)) & 63;
-#endif
+        int bit = next_turned(mask, begin);
         vec2 pair = bit < 32 ? offset.xy : offset.zw;
         Depth d = depth_of(t, (bit & 16) == 0 ? pair.x : pair.y);
         if (!d.none) {
