@@ -22,7 +22,7 @@ from agreement.helpers import (
     soup,
 )
 from agreement.test_mesh_agreement import DISPLAYS, integers
-from autostereo.engines.gl import plane_buffers, plane_rasterizer
+from autostereo.engines.gl import context, plane_buffers, plane_rasterizer
 from autostereo.engines.gl.programs import expand
 from gl_device import need_device
 
@@ -281,7 +281,7 @@ def test_staggered_triangles_change_different_samples_of_a_tile(device, on_panel
     for stagger in (False, True):
         defines = {"PANEL": on_panel, "STAGGER": stagger}
         with device:
-            program = device.programs.compile({"order.comp": expand(ORDER, defines, plane_rasterizer.VERSION)})
+            program = device.programs.compile({"order.comp": expand(ORDER, defines, context.COMPUTE_VERSION)})
             found = device.ctx.buffer(reserve=4 * 64 * planes)
             found.bind_to_storage_buffer(0)
             program.run(planes)
