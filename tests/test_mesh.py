@@ -140,7 +140,7 @@ def test_bounds_are_of_the_vertices_in_use_in_world_space():
         ("vertices", [(0, 0), (1, 0), (0, 1)], r"vertices: expected shape \(N, 3\), got \(3, 2\)"),
         ("vertices", "abc", "vertices: expected an array of numbers"),
         ("vertices", [(0, 0, 0), (1, 0, np.nan), (0, np.inf, 0)], "vertices: .* NaN or infinity in 2 of 3 rows"),
-        ("vertices", [(0, 0, 0), (1, 0, 0), (0, 1e31, 0)], "vertices: coordinates beyond"),
+        ("vertices", [(0, 0, 0), (1, 0, 0), (0, 1e31, 0)], r"vertices: expected numbers within ±1e\+30, found ±1e\+31"),
         ("faces", [(0, 1, 3)], "faces: expected indices 0…2, found 0…3"),
         ("faces", [(0, -1, 2)], "faces: expected indices 0…2, found -1…2"),
         ("faces", np.zeros((0, 3), int), "faces: expected at least one triangle"),

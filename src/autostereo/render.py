@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import methods
+from .checks import FARTHEST, real_array
 from .display.display import Display
 from .display.optics import wanted_phase
 from .display.rig import Rig
@@ -26,8 +27,7 @@ from .scene.transfer import TransferFunction
 from .scene.volume import Volume
 
 MAX_SIDE = 65536
-MAX_VIEWS = 4096
-FARTHEST = 1e30  # of a camera's offset, as in Rig
+MAX_SHIFT = 1e9  # pixels: what engines still count in 32 bits
 
 
 def render(
@@ -165,10 +165,7 @@ class Renderer:
         """
         objects = list(self.scene.objects)
         if transform is not None:
-            try:
-                given = np.asarray(transform, dtype=np.float64)
-            except (TypeError, ValueError):
-                raise InputError(f"transform: expected matrices of numbers, got {type(transform).__name__}") from None
+            given = real_array("transform", transform, "matrices of numbers")
             each = [given] * len(objects) if given.ndim == 2 else list(given) if given.ndim == 3 else []
             if len(each) != len(objects):
                 raise InputError(f"transform: expected one (4, 4) matrix or {len(objects)} of them, got {given.shape}")
@@ -265,12 +262,9 @@ def warp(pictures: ViewStack, rig: Rig, offsets: Sequence[float] | NDArray[np.fl
     if not isinstance(rig, Rig):
         raise InputError(f"rig: expected a Rig, got {type(rig).__name__}")
     check_arguments(rig, None)
-    try:
-        places = np.array(offsets, np.float64)
-        with np.errstate(over="ignore"):  # beyond float32 is infinitely far
-            depths = np.array(pictures.depth, np.float32)
-    except (TypeError, ValueError):
-        raise InputError("pictures, offsets: expected depths and offsets that are numbers") from None
+    places = np.array(real_array("offsets", offsets, "numbers"), np.float64)
+    with np.errstate(over="ignore"):  # beyond float32 is infinitely far
+        depths = np.array(real_array("pictures", pictures.depth, "depths that are numbers"), np.float32)
     if places.shape != (pictures.views,) or not (np.abs(places) < FARTHEST).all():
         raise InputError(f"offsets: expected {pictures.views} numbers, one a picture, got {offsets!r}")
     if not (depths > 0).all():
@@ -324,11 +318,9 @@ def observe(
 
 
 def check_arguments(rig: Any, options: Any) -> None:
-    """Raise InputError unless these are a Rig of a sane number of views and Options, or None."""
+    """Raise InputError unless these are a Rig and Options, or None."""
     if rig is not None and not isinstance(rig, Rig):
         raise InputError(f"rig: expected a Rig, got {type(rig).__name__}")
-    if rig is not None and rig.views > MAX_VIEWS:
-        raise InputError(f"rig views: expected at most {MAX_VIEWS}, got {rig.views}")
     if options is not None and not isinstance(options, Options):
         raise InputError(f"options: expected Options(…), got {type(options).__name__}")
 
@@ -340,6 +332,12 @@ def make_camera(rig: Rig, size: tuple[int, int]) -> Camera:
     fy = height / 2 / half
     aspect = rig.aspect if rig.aspect is not None else width / height
     fx = width / 2 / (aspect * half)
+    reach = max(fx * float(np.abs(rig.camera_offsets).max()), fy * abs(rig.offset_y)) / rig.focal
+    if reach > MAX_SHIFT:
+        raise InputError(
+            f"rig: expected its outermost cameras to see a far point up to {MAX_SHIFT:g} pixels apart from the middle "
+            f"one, found {reach:g}; compare baseline and focal_distance"
+        )
     return Camera(rig.eye_from_world, float(fx), float(fy), width, height, rig.focal, rig.near_depth, rig.offset_y)
 
 

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from ..scene.volume import Volume
 
 MAX_SIDE = 32_768  # what a Display takes
-MAX_VIEWS = 4_096
 
 
 class State:
@@ -148,6 +147,8 @@ def parse_color(text: str, name: str = "--background") -> tuple[float, float, fl
 
 def check_views(views: int | None) -> None:
     """Refuse a view count that is no count."""
+    from ..checks import MAX_VIEWS
+
     if views is not None and not 1 <= views <= MAX_VIEWS:
         raise InputError(f"--views: expected a number from 1 to {MAX_VIEWS}, got {views}")
 

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import FOV_RANGE, check_number, check_views
 from ..errors import InputError, UnsupportedError
 from ..viewmap import ViewMap
 from . import masks
 from .calibration import Calibration, read_calibration
-from .masks import check_flag, check_number, check_size, check_views
+from .masks import check_flag, check_size
 from .quilt import Quilt
 
 PACKED = ("side-by-side", "side-by-side-half", "top-bottom", "top-bottom-half")
@@ -101,13 +102,13 @@ class Display:
         half = {"side-by-side-half": self.width, "rgbd": self.width, "top-bottom-half": self.height}
         if half.get(self.layout, 0) % 2:
             raise InputError(f"{self.layout}: expected an even number of pixels to halve, got {half[self.layout]}")
-        put(self, "fov_y", check_number("fov_y", self.fov_y, 0.0, 179.0))
-        put(self, "comfort", check_number("comfort", self.comfort, 0.0, 1e6))
-        put(self, "cone_deg", check_number("cone_deg", self.cone_deg, 0.0, 180.0))
+        put(self, "fov_y", check_number("fov_y", self.fov_y, *FOV_RANGE))
+        put(self, "comfort", check_number("comfort", self.comfort, 1e-3, 1e6))
+        put(self, "cone_deg", check_number("cone_deg", self.cone_deg, 0.001, 179.0))
         if self.size_mm is not None:
             put(self, "size_mm", _pair_mm(self.size_mm))
         if self.distance_mm is not None:
-            put(self, "distance_mm", check_number("distance_mm", self.distance_mm, 0.0, 1e9))
+            put(self, "distance_mm", check_number("distance_mm", self.distance_mm, 1e-3, 1e9))
         if self.quilt is not None and self.quilt.views < self.views:
             raise InputError(f"quilt: {self.quilt.columns}×{self.quilt.rows} tiles cannot hold {self.views} views")
 
@@ -359,7 +360,7 @@ class Display:
 def _pair_mm(value: Any) -> tuple[float, float]:
     if isinstance(value, (str, bytes)) or not isinstance(value, (Sequence, np.ndarray)) or len(value) != 2:
         raise InputError(f"size_mm: expected (width, height) in millimetres, got {value!r}")
-    return (check_number("size_mm width", value[0], 0.0, 1e9), check_number("size_mm height", value[1], 0.0, 1e9))
+    return (check_number("size_mm width", value[0], 1e-3, 1e9), check_number("size_mm height", value[1], 1e-3, 1e9))
 
 
 def _two_view_comfort(width: Any) -> float:

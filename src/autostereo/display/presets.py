@@ -19,11 +19,12 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from ..checks import check_views
 from ..errors import AutostereoError, FileError, InputError
 from . import masks
 from .calibration import Calibration, read_calibration
 from .display import Display, looking_glass
-from .masks import check_size, check_views
+from .masks import check_size
 from .quilt import Quilt
 
 if sys.version_info >= (3, 11):

@@ -7,33 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import FARTHEST, Vector, check_direction, check_number, check_vector
 from ..errors import InputError
-
-Vector = tuple[float, float, float]
-
-
-def check_vector(name: str, value: object) -> Vector:
-    """Return three finite numbers as a tuple, or raise an error that names the field."""
-    try:
-        v = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{name}: expected three numbers, got {value!r}") from None
-    if v.shape != (3,) or not np.isfinite(v).all():
-        raise InputError(f"{name}: expected three finite numbers, got {value!r}")
-    return (float(v[0]), float(v[1]), float(v[2]))
-
-
-def check_number(name: str, value: object, low: float = -np.inf, high: float = np.inf) -> float:
-    """Return a finite number within [low, high], or raise an error that names the field."""
-    if isinstance(value, (bool, str, bytes, complex)) or not np.isscalar(value):
-        raise InputError(f"{name}: expected a number, got {value!r}")
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except OverflowError:  # a whole number of hundreds of digits
-        number = np.inf
-    if not np.isfinite(number) or not low <= number <= high:
-        raise InputError(f"{name}: expected a finite number in [{low:g}, {high:g}], got {value!r}")
-    return number
 
 
 @dataclass(frozen=True)
@@ -72,10 +47,8 @@ class DirectionalLight:
     color: Vector = (1.0, 1.0, 1.0)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "direction", check_vector("light direction", self.direction))
-        object.__setattr__(self, "color", check_vector("light color", self.color))
-        if not any(self.direction):
-            raise InputError("light direction: expected a vector of some length, got (0, 0, 0)")
+        object.__setattr__(self, "direction", check_direction("light direction", self.direction))
+        object.__setattr__(self, "color", check_vector("light color", self.color, 1e6))
 
 
 @dataclass(frozen=True)
@@ -86,8 +59,8 @@ class PointLight:
     color: Vector = (1.0, 1.0, 1.0)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position", check_vector("light position", self.position))
-        object.__setattr__(self, "color", check_vector("light color", self.color))
+        object.__setattr__(self, "position", check_vector("light position", self.position, FARTHEST))
+        object.__setattr__(self, "color", check_vector("light color", self.color, 1e6))
 
 
 Light = DirectionalLight | PointLight
