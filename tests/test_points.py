@@ -102,7 +102,7 @@ def test_a_scene_takes_points_beside_meshes():
         (lambda: Points(THREE, radii="big"), "radii: expected numbers, got str"),
         (lambda: Points(THREE, normals=[(0, 0, 1)]), r"normals: expected shape \(3, 3\), got \(1, 3\)"),
         (lambda: Points(THREE, normals=[(0, 0, np.inf)] * 3), "normals: expected finite numbers"),
-        (lambda: Points(THREE, colors=[(0, 0, 2.0)] * 3), "colors: expected 0…1"),
+        (lambda: Points(THREE, colors=[(0, 0, 2.0)] * 3), "colors: expected floats 0…1"),
         (lambda: Points(THREE, colors=[(0, 0, 1.0)]), r"colors: expected shape \(3, 3\) or \(3, 4\), got \(1, 3\)"),
         (lambda: Points(THREE, material="wood"), "material: expected a Material, got str"),
         (lambda: Points(THREE, transform=np.eye(3)), "transform: expected shape"),

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import check_reach, real_array
 from ..errors import InputError
 from ..transforms import apply, as_transform, check_world
-from .appearance import Material, check_image
+from .appearance import Material, check_color_values, check_image
 
 
 def _floats(name: str, value: ArrayLike, columns: tuple[int, ...], count: int | None = None) -> NDArray[np.float64]:
@@ -29,12 +29,12 @@ def _floats(name: str, value: ArrayLike, columns: tuple[int, ...], count: int | 
 
 def _colors(value: ArrayLike, count: int) -> NDArray[np.float32]:
     """Return colours as (N, 3) float32 in 0…1; integers count as 0…255, alpha is ignored."""
-    a = _floats("colors", value, (3, 4), count)[:, :3]
-    if np.issubdtype(np.asarray(value).dtype, np.integer):
+    given = real_array("colors", value)
+    a = _floats("colors", given, (3, 4), count)[:, :3]
+    check_color_values("colors", given[:, :3])
+    if given.dtype.kind in "iu":
         a = a / 255.0
-    if a.size and (a.min() < 0 or a.max() > 1):
-        raise InputError(f"colors: expected 0…1 (float) or 0…255 (uint8), found {a.min():g}…{a.max():g}")
-    return np.ascontiguousarray(a, dtype=np.float32)
+    return np.ascontiguousarray(np.clip(a, 0.0, 1.0), dtype=np.float32)
 
 
 def _faces(value: ArrayLike, count: int) -> NDArray[np.int32]:
@@ -100,11 +100,13 @@ class Mesh:
     normals : array_like of shape (N, 3), optional
         Missing normals are angle-weighted over vertices merged by position.
     colors : array_like of shape (N, 3 or 4), optional
-        Display (sRGB) values, float 0…1 or uint8; alpha is ignored. Default white.
+        Display (sRGB) values: floats 0…1, or integers of any type 0…255, so that an integer 1 is nearly black and
+        white is 255 or 1.0; alpha is ignored. Default white.
     uv : array_like of shape (N, 2), optional
         Texture coordinates, (0, 0) the bottom left of the texture; they repeat.
     texture : image of shape (h, w, 3 or 4), optional
-        uint8 or float 0…1, or a PIL image; needs `uv`. A uint8 RGB array is not copied: objects can share it.
+        Values as of `colors`, or a PIL image; needs `uv`. Grey (h, w) is spread, alpha dropped. A uint8 RGB array is
+        not copied: objects can share it.
     material : Material, optional
     transform : array_like of shape (4, 4), optional
         world_from_object.

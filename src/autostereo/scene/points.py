@@ -34,7 +34,7 @@ class Points:
     radii : array_like of shape (N,) or float, optional
         In object space, > 0. None: estimated from neighbours, such that evenly sampled surfaces have no holes.
     colors : array_like of shape (N, 3 or 4), optional
-        Display (sRGB) values, float 0…1 or uint8; alpha is ignored. Default light grey (0.8).
+        Display (sRGB) values: floats 0…1, or integers of any type 0…255; alpha is ignored. Default light grey (0.8).
     transform : array_like of shape (4, 4), optional
         world_from_object.
     material : Material, optional
