@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 MAX_SIDE = 32_768  # what a Display takes
 
-
 class State:
     """Settings of the running command."""
 
@@ -176,8 +175,14 @@ def check_output(path: Path, suffixes: tuple[str, ...] = ()) -> Path:
     return path
 
 
+def check_apart(output: Path, *inputs: Path) -> None:
+    """Refuse an output that is one of the inputs, whatever it is called."""
+    if output.exists() and any(path.exists() and path.samefile(output) for path in inputs):
+        raise InputError(f"{output}: is also an input, which would be lost; give the output another name")
+
+
 def check_image(path: Path) -> Path:
-    """The same for an image file."""
+    """`check_output` for an image file."""
     from ..image import IMAGE_SUFFIXES
 
     return check_output(path, IMAGE_SUFFIXES)

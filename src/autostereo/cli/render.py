@@ -66,6 +66,7 @@ def render(
     common.check_side(side, camera)
     rig = common.load_camera(camera)
     path = common.check_image(output or Path(f"{common.stem(inputs[0])}_{common.slug(display)}.png"))
+    common.check_apart(path, *inputs)
     scene = common.load_scene(inputs, background, volumes)
 
     from ..display.rig import Rig

@@ -91,6 +91,7 @@ def views(
     common.check_side(side, camera)
     rig = common.load_camera(camera)
     common.check_output(output, (suffix,) if suffix else ())
+    common.check_apart(output, *inputs)
     scene = common.load_scene(inputs, background, volumes)
     rig = common.frame_views(scene, rig, views, pixels, display, side)
     if lens is not None:

@@ -62,6 +62,7 @@ def warp(
         raise InputError(f"{where.name}: a {where.layout} picture is not interlaced; leave out --display for views")
     common.check_views(views)
     common.check_output(output, (suffix,) if suffix else ())
+    common.check_apart(output, picture, depth)
     rig = common.load_camera(camera)
     field = rig.fov_y if rig is not None else 36.0 if fov is None else fov
     taken = read_rgbd(picture, depth, unit)

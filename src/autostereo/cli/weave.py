@@ -56,6 +56,7 @@ def weave(
     if where.viewmap is None:
         raise InputError(f"{where.name}: a {where.layout} picture is not woven from a quilt")
     common.check_image(output)
+    common.check_apart(output, quilt)
     common.announce_compilation("cpu", "_weave")
     pixels = common.load_picture(quilt, alpha=True)
     from ..engines.cpu.gather import weave as draw
