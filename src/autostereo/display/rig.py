@@ -26,7 +26,7 @@ from ..checks import (
     real_array,
 )
 from ..errors import FileError, InputError
-from ..image import write_atomic
+from ..image import as_path, write_atomic
 from ..transforms import eye_from_world
 from ..viewmap import offset_at
 
@@ -176,7 +176,7 @@ class Rig:
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Rig:
         """Read a JSON file of rig fields; unknown fields are errors."""
-        path = Path(path)
+        path = as_path(path)
         try:
             fields: Any = json.loads(path.read_text(encoding="utf-8"))
         except OSError as error:
