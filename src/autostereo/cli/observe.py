@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from . import common
+from . import common, outputs
 from .common import note, say
 
 
@@ -45,8 +45,8 @@ def observe(
     if eye is not None:
         x, z = common.parse_numbers(eye, "--eye", 2)
         place = (x, z)
-    common.check_image(output)
-    common.check_apart(output, panel)
+    outputs.check_image(output)
+    outputs.check_apart(output, panel)
     where = common.load_display(display, None, swap, views, continuous)
     pixels = common.load_picture(panel)
     width, height = where.picture_size

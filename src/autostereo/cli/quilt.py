@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import FileError, InputError
-from . import common
+from . import common, outputs
 from .common import say
 
 if TYPE_CHECKING:
@@ -75,8 +75,8 @@ def quilt(
     rig = common.load_camera(camera)
     from ..encoders.quilt import quilt_path
 
-    path = common.check_image(quilt_path(_place(output, f"{common.stem(inputs[0])}.png"), layout))
-    common.check_apart(path, *inputs)
+    path = outputs.check_image(quilt_path(_place(output, f"{common.stem(inputs[0])}.png"), layout))
+    outputs.check_apart(path, *inputs)
     scene = common.load_scene(inputs, background, volumes)
     rig = _frame(scene, where, layout, side) if rig is None else rig.with_views(layout.views)
     if rig.aspect is None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
-from . import common
+from . import common, outputs
 from .common import note, say
 
 
@@ -65,8 +65,8 @@ def render(
     volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
     common.check_side(side, camera)
     rig = common.load_camera(camera)
-    path = common.check_image(output or Path(f"{common.stem(inputs[0])}_{common.slug(display)}.png"))
-    common.check_apart(path, *inputs)
+    path = outputs.check_image(output or Path(f"{common.stem(inputs[0])}_{common.slug(display)}.png"))
+    outputs.check_apart(path, *inputs)
     scene = common.load_scene(inputs, background, volumes)
 
     from ..display.rig import Rig

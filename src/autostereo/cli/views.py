@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import DependencyError, InputError
-from . import common
+from . import common, outputs
 from .common import say
 
 if TYPE_CHECKING:
@@ -90,8 +90,8 @@ def views(
     volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
     common.check_side(side, camera)
     rig = common.load_camera(camera)
-    common.check_output(output, (suffix,) if suffix else ())
-    common.check_apart(output, *inputs)
+    outputs.check_output(output, (suffix,) if suffix else ())
+    outputs.check_apart(output, *inputs)
     scene = common.load_scene(inputs, background, volumes)
     rig = common.frame_views(scene, rig, views, pixels, display, side)
     if lens is not None:
@@ -117,7 +117,7 @@ def write_views(output: Path, stack: ViewStack, rig: Rig) -> None:
         elif suffix:
             stack.save(output)
         else:
-            with common.whole_folder(output, stale="view_*.png") as folder:
+            with outputs.whole_folder(output, stale="view_*.png") as folder:
                 stack.save(folder)
                 rig.save(folder / "rig.json")
     say(f"{output}  {stack.views} views of {stack.width}×{stack.height}")

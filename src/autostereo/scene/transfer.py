@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import LARGEST, check_number, check_reach, real_array
 from ..errors import FileError, InputError
-from ..image import write_atomic
+from ..image import as_path, write_atomic
 
 if TYPE_CHECKING:
     from .volume import Volume
@@ -280,7 +280,7 @@ class TransferFunction:
         FileError
             The file is missing or not a transfer function; the message names it.
         """
-        path = Path(path)
+        path = as_path(path)
         try:
             data = json.loads(path.read_text(encoding="utf-8"))
         except FileNotFoundError:
