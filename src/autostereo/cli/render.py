@@ -65,7 +65,8 @@ def render(
     volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
     common.check_side(side, camera)
     rig = common.load_camera(camera)
-    path = outputs.check_image(output or Path(f"{common.stem(inputs[0])}_{common.slug(display)}.png"))
+    ending = "_2x2" if where.layout == "leia-2x2" else ""  # by which its device knows it
+    path = outputs.check_image(output or Path(f"{common.stem(inputs[0])}_{common.slug(display)}{ending}.png"))
     outputs.check_apart(path, *inputs)
     scene = common.load_scene(inputs, background, volumes)
 
@@ -84,4 +85,6 @@ def render(
         note(f"{panel.reused:.0%} of the samples have a nearby view's colour")
     with common.working("writing"):
         panel.save(path)
+    if not path.stem.endswith(ending):
+        note(f"{path}: its device wants a name that ends in {ending}, such as {path.stem}{ending}{path.suffix}")
     say(f"{path}  {panel.width}×{panel.height}")
