@@ -71,10 +71,12 @@ def test_ends_of_the_ranges_are_taken():
 
 def test_cameras_whose_parallax_cannot_be_counted():
     """Every number is in its range, but pixels would be counted beyond 32 bits."""
-    with pytest.raises(aus.InputError, match="compare baseline and focal_distance"):
+    with pytest.raises(aus.InputError, match=r"compare baseline \(or aperture\) and focal_distance"):
         make_camera(aus.Rig(focal_distance=1e-30, baseline=1e15), (8, 8))
-    with pytest.raises(aus.InputError, match="compare baseline and focal_distance"):
+    with pytest.raises(aus.InputError, match=r"compare baseline \(or aperture\) and focal_distance"):
         make_camera(aus.Rig(focal_distance=1e-30, offset_y=1e15), (8, 8))
+    with pytest.raises(aus.InputError, match=r"compare baseline \(or aperture\) and focal_distance"):
+        make_camera(aus.Rig(focal_distance=1e-30, baseline=0), (8, 8), aperture=1e15)
 
 
 def test_up_may_be_short():

@@ -134,7 +134,7 @@ class Renderer:
             raise InputError("rig: expected a Rig, got None")
         options = options or Options()
         schedule = methods.get_method(method, self.engine)
-        camera = make_camera(rig, size)
+        camera = make_camera(rig, size, options.aperture)
         check_in_view(self.scene, rig)
         offsets = rig.camera_offsets
         shape = (len(offsets), camera.height, camera.width)
@@ -325,18 +325,19 @@ def check_arguments(rig: Any, options: Any) -> None:
         raise InputError(f"options: expected Options(…), got {type(options).__name__}")
 
 
-def make_camera(rig: Rig, size: tuple[int, int]) -> Camera:
-    """The centre camera of a rig for pictures of `size` = (width, height)."""
+def make_camera(rig: Rig, size: tuple[int, int], aperture: float = 0.0) -> Camera:
+    """The centre camera of a rig for pictures of `size` = (width, height), seen through lenses of that `aperture`."""
     width, height = check_size(size)
     half = np.tan(np.deg2rad(rig.fov_y) / 2)
     fy = height / 2 / half
     aspect = rig.aspect if rig.aspect is not None else width / height
     fx = width / 2 / (aspect * half)
-    reach = max(fx * float(np.abs(rig.camera_offsets).max()), fy * abs(rig.offset_y)) / rig.focal
+    across, up = float(np.abs(rig.camera_offsets).max()) + aperture / 2, abs(rig.offset_y) + aperture / 2
+    reach = max(fx * across, fy * up) / rig.focal
     if reach > MAX_SHIFT:
         raise InputError(
             f"rig: expected its outermost cameras to see a far point up to {MAX_SHIFT:g} pixels apart from the middle "
-            f"one, found {reach:g}; compare baseline and focal_distance"
+            f"one, found {reach:g}; compare baseline (or aperture) and focal_distance"
         )
     return Camera(rig.eye_from_world, float(fx), float(fy), width, height, rig.focal, rig.near_depth, rig.offset_y)
 

@@ -28,7 +28,8 @@ def as_transform(matrix: ArrayLike | None, name: str = "transform") -> Array:
 
 def check_world(name: str, transform: Array, points: Array) -> None:
     """Raise InputError when `transform` may take one of points (N, 3) beyond ±LARGEST."""
-    reach = np.abs(transform[:3, :3]) @ np.abs(points).max(axis=0, initial=0.0) + np.abs(transform[:3, 3])
+    farthest = np.maximum(-points.min(axis=0, initial=0.0), points.max(axis=0, initial=0.0))
+    reach = np.abs(transform[:3, :3]) @ farthest + np.abs(transform[:3, 3])
     if reach.max() > LARGEST:
         raise InputError(f"{name}: expected places in the world within ±{LARGEST:g}, found up to ±{reach.max():g}")
 
