@@ -100,7 +100,7 @@ def test_help_loads_no_renderer() -> None:
 def test_one_file_per_verb() -> None:
     from autostereo.cli.app import VERBS
 
-    files = {path.stem for path in (PACKAGE / "cli").glob("*.py")} - {"__init__", "app", "common", "reuse"}
+    files = {path.stem for path in (PACKAGE / "cli").glob("*.py")} - {"__init__", "app", "common", "outputs"}
     assert files == {verb.__name__ for verb in VERBS}
     assert all(verb.__module__ == f"autostereo.cli.{verb.__name__}" for verb in VERBS)
 

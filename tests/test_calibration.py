@@ -185,6 +185,19 @@ def test_cells_against_stripes_differ_as_measured_on_a_unit() -> None:
     assert np.median(difference[..., 2]) == 5 and difference[..., 2].min() >= 1 and difference[..., 2].max() <= 6
 
 
+@pytest.mark.parametrize(("mode", "least"), [(0, 1), (1, 2), (2, 2), (3, 4), (4, 2)])
+def test_a_pattern_has_all_its_cells(mode: int, least: int) -> None:
+    cells = GEN3["subpixelCells"]
+    fields = {**GEN3, "CellPatternMode": mode}
+    for count in range(1, 5):
+        given = {**fields, "subpixelCells": (2 * cells)[:count]}  # type: ignore[operator]
+        if count >= least:
+            assert len(read_calibration(given).cells) == count
+        else:
+            with pytest.raises(aus.InputError, match=f"subpixelCells: expected {least} cells .* {mode}, found {count}"):
+                read_calibration(given)
+
+
 def test_without_cells_the_pattern_mode_has_no_meaning() -> None:
     assert np.array_equal(phase(STRIPED, CellPatternMode=2), phase(STRIPED))
 

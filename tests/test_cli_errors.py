@@ -252,6 +252,34 @@ def test_unexpected_errors_are_one_line_and_a_traceback_only_on_demand(
         cli("render", "square.off", "-d", "lenticular-8")
 
 
+STRIKE = """
+import os, signal, sys
+signal.signal(signal.SIGINT, {handler})
+class Strike:
+    def find_spec(self, name, *rest):
+        if name == {module!r}:
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Strike())
+sys.argv = ["autostereo", "--version"]
+from autostereo.cli import main
+main()
+"""
+
+
+@pytest.mark.parametrize("module", ["autostereo.cli.app", "typer", "autostereo.cli.weave"])
+def test_interrupt_while_modules_are_imported(module: str) -> None:
+    code = STRIKE.format(module=module, handler="signal.default_int_handler")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "autostereo: interrupted\n")
+
+
+def test_an_interrupt_that_is_to_be_ignored_is() -> None:
+    """As for what a shell starts in the background."""
+    code = STRIKE.format(module="typer", handler="signal.SIG_IGN")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"autostereo {aus.__version__}\n", "")
+
+
 def test_interrupt_while_writing_leaves_nothing(cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C after some of the files are written."""
     from autostereo import image

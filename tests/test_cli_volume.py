@@ -85,6 +85,8 @@ def test_info_of_a_mixed_scene(cli: Run, folder: Path) -> None:
         (("a.raw", *RAW, "--spacing", "1,2,0"), "spacing: expected numbers > 0"),
         (("a.raw", *RAW, "--mode", "xray"), "mode: expected one of composite, mip, iso"),
         (("a.raw", *RAW, "--mode", "mip", "--iso", "3"), "--iso: needs --mode iso"),
+        (("a.raw", *RAW, "--iso", "nan"), "--iso: expected a value within the volume's, 0…100, got nan"),
+        (("a.raw", *RAW, "--iso", "1e9"), "--iso: expected a value within the volume's, 0…100, got 1e+09"),
         (("a.raw", *RAW, "--transfer", "nope"), "expected a .json file, a preset (generic"),
         (("a.raw", *RAW, "--transfer", "nope.json"), "nope.json: no such file"),
         (("a.raw", *RAW, "--frame", "1"), "has no frame 1"),

@@ -57,7 +57,7 @@ def test_in_focus_is_sharp_and_the_rest_is_not():
 
 def test_errors():
     for fields, message in (
-        ({"aperture": -1.0}, "aperture: expected a number ≥ 0"),
+        ({"aperture": -1.0}, r"aperture: expected a number from 0 to 1e\+15"),
         ({"lens": (0, 4)}, "lens: expected two whole numbers"),
         ({"aperture": 0.1, "depth": True}, "no one depth"),
     ):

@@ -344,7 +344,7 @@ def test_what_cannot_be_warped_is_refused():
         aus.warp(picture, None)
     with pytest.raises(aus.InputError, match=r"depth: expected shape \(1, 64, 96\), got \(1, 63, 96\)"):
         aus.ViewStack(picture.color, picture.depth[:, 1:])
-    with pytest.raises(aus.InputError, match="expected depths and offsets that are numbers"):
+    with pytest.raises(aus.InputError, match="expected depths that are numbers, got text"):
         aus.warp(aus.ViewStack(picture.color, np.full((1, H, W), "near")), RIG)
     for bad in (0.0, -1.0, np.nan, -np.inf, 1e-50):
         depth = picture.depth.astype(np.float64)

@@ -86,6 +86,16 @@ def test_bad_pictures(tmp_path):
     path.write_bytes(data[: len(data) // 2])
     with pytest.raises(FileError, match=r"a\.png: the picture is damaged or truncated"):
         read_image(path)
+    tiff = tmp_path / "a.tif"
+    Image.fromarray(np.ones((4, 4), np.float32)).save(tiff)
+    with pytest.raises(FileError, match=r"a\.tif: holds floats, which have no fixed range as colours; expected 8"):
+        read_image(tiff)
+    Image.fromarray(np.ones((4, 4), np.int32)).save(tiff)
+    with pytest.raises(FileError, match=r"a\.tif: holds integers of 32 bits, which"):
+        read_image(tiff)
+    tiff.write_bytes(b"II*\0" + bytes(99))
+    with pytest.raises(FileError, match=r"a\.tif: is damaged, or is no TIFF of 8 or 16 bits a colour \(floats are not"):
+        read_image(tiff)
     path.write_bytes(b"no picture at all")
     with pytest.raises(FileError, match=r"a\.png: is not a picture"):
         read_image(path)

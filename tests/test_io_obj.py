@@ -208,6 +208,14 @@ def test_bad_mtl(tmp_path):
     text = SQUARE + "usemtl a\nf 1 2 3 4\n"
     refused(obj(tmp_path, text, "newmtl a\nKd red\n"), "a.mtl: expected numbers for Kd, found 'red'")
     refused(obj(tmp_path, text, "newmtl a\nKd nan 0 0\n"), "a.mtl: expected finite numbers for Kd")
+    refused(obj(tmp_path, text, "\x89PNG\r\n\x1a\n\x00\x00"), "a.mtl: is not a library of materials (MTL)")
+
+
+def test_an_empty_library_is_one_without_materials(tmp_path):
+    """Exporters write a header of comments where there are none."""
+    path = obj(tmp_path, SQUARE + "usemtl a\nf 1 2 3 4\n", "# Blender MTL File\n\n# Material Count: 0\n")
+    with pytest.warns(UserWarning, match="no library defines the materials a"):
+        assert only(path).colors is None
 
 
 # --- real files ---------------------------------------------------------------------------------------

@@ -14,10 +14,10 @@ from autostereo.scene.samples import surfel_cloud
 
 DOOR = importlib.import_module("autostereo.render")  # the module: the package gives the function of that name
 RIG = aus.Rig(position=(0, 0, 4), fov_y=40, baseline=1.2, views=12, near=0.2)
-SIZE = (640, 480)
+SIZE = (1280, 960)
 TABLE = aus.Display.slanted(*SIZE, 12, lens_pitch=5.7, subpixel_pitch=1.0, slant_deg=9.46)
 PICTURE = 4 * SIZE[0] * SIZE[1]
-SMALL = 3_000_000  # bytes of what is no picture: bands of rows, triangles, offsets
+SMALL = 8_000_000  # bytes of what is no picture: bands of rows, triangles, offsets
 
 
 def triangle() -> aus.Scene:
@@ -81,9 +81,9 @@ def test_parts_that_fit_one_by_one_are_refused_together(monkeypatch: pytest.Monk
     monkeypatch.setattr("autostereo.memory.available_memory", lambda: int(1.5 * views))
     frame(triangle(), "views", "single-pass", "cpu")
     for options in ({"depth": True}, {"aperture": 0.1, "lens": (8, 1)}):
-        with pytest.raises(aus.MemoryLimitError, match=r"12 views of 640×480 pixels would take 0\.0\d+ GB"):
+        with pytest.raises(aus.MemoryLimitError, match=r"12 views of 1280×960 pixels would take 0\.\d+ GB"):
             frame(triangle(), "views", "single-pass", "cpu", **options)
-    with pytest.raises(aus.MemoryLimitError, match="12 views of 640×480"):
+    with pytest.raises(aus.MemoryLimitError, match="12 views of 1280×960"):
         frame(triangle(), "views", "dibr", "cpu", references=8)
 
 

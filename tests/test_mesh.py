@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from PIL import Image
 
 from autostereo import DirectionalLight, InputError, Material, Mesh, PointLight, Scene
 from autostereo.scene import shapes
@@ -140,7 +141,7 @@ def test_bounds_are_of_the_vertices_in_use_in_world_space():
         ("vertices", [(0, 0), (1, 0), (0, 1)], r"vertices: expected shape \(N, 3\), got \(3, 2\)"),
         ("vertices", "abc", "vertices: expected an array of numbers"),
         ("vertices", [(0, 0, 0), (1, 0, np.nan), (0, np.inf, 0)], "vertices: .* NaN or infinity in 2 of 3 rows"),
-        ("vertices", [(0, 0, 0), (1, 0, 0), (0, 1e31, 0)], "vertices: coordinates beyond"),
+        ("vertices", [(0, 0, 0), (1, 0, 0), (0, 1e31, 0)], r"vertices: expected numbers within ±1e\+30, found ±1e\+31"),
         ("faces", [(0, 1, 3)], "faces: expected indices 0…2, found 0…3"),
         ("faces", [(0, -1, 2)], "faces: expected indices 0…2, found -1…2"),
         ("faces", np.zeros((0, 3), int), "faces: expected at least one triangle"),
@@ -149,9 +150,9 @@ def test_bounds_are_of_the_vertices_in_use_in_world_space():
         ("faces", [(0, 1, 2), (0, 1)], "faces: expected an array of integers, got list of uneven rows"),
         ("colors", [(0, 0, 0), (0, 0), (0, 0, 0)], "colors: expected an array of numbers"),
         ("normals", [(0, 0, 1)], r"normals: expected shape \(3, 3\), got \(1, 3\)"),
-        ("colors", [(0, 0, 2.0)] * 3, "colors: expected 0…1"),
+        ("colors", [(0, 0, 2.0)] * 3, "colors: expected .*0…1"),
         ("colors", [(0, 0)] * 3, r"colors: expected shape \(3, 3\) or \(3, 4\)"),
-        ("colors", [(0, 0, 256)] * 3, "colors: expected 0…1"),
+        ("colors", [(0, 0, 256)] * 3, "colors: expected .*0…1"),
         ("uv", [(0, 0, 0)] * 3, r"uv: expected shape \(3, 2\), got \(3, 3\)"),
         ("texture", np.zeros((2, 2, 3), np.uint8), "texture: needs uv"),
         ("material", "shiny", "material: expected a Material, got str"),
@@ -181,13 +182,13 @@ def test_a_mesh_does_not_change_with_the_arrays_it_was_made_from():
 
 
 def test_textures_become_rgb_bytes():
-    grey = np.array([[0.0, 0.5], [1.0, 2.0]])
+    grey = np.array([[0.0, 0.5], [1.0, 1.0]])
     np.testing.assert_array_equal(check_image("texture", grey)[..., 1], [[0, 128], [255, 255]])
     rgba = np.arange(16, dtype=np.uint8).reshape(2, 2, 4)
     np.testing.assert_array_equal(check_image("texture", rgba), rgba[..., :3])
     shared = np.zeros((4, 4, 3), np.uint8)
     assert check_image("texture", shared) is shared
-    for bad in (np.zeros((2, 2, 5), np.uint8), np.zeros((0, 2, 3), np.uint8), np.zeros((2, 2, 3), np.int64), "x"):
+    for bad in (np.zeros((2, 2, 5), np.uint8), np.zeros((0, 2, 3), np.uint8), np.full((2, 2, 3), 256), "x"):
         with pytest.raises(InputError, match=r"^texture: "):
             check_image("texture", bad)
     with pytest.raises(InputError, match="texture: expected finite"):
@@ -226,3 +227,46 @@ def test_scene_takes_a_single_object_and_a_single_light():
     scene = Scene(TRIANGLE, lights=light)
     assert scene.objects == (TRIANGLE,) and scene.lights == (light,)
     assert Scene.of(scene) is scene and Scene.of([TRIANGLE]).objects == (TRIANGLE,)
+
+
+TEXTURED = replace(TRIANGLE, uv=[(0, 0), (1, 0), (0, 1)])
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.int8, np.int16, np.uint16, np.int32, np.uint32, np.int64, np.uint64])
+def test_integer_colours_and_textures_are_of_255_whatever_their_type(dtype):
+    """0 and 1 as well: what an integer means does not depend on the other ones in the array."""
+    ones = replace(TRIANGLE, colors=np.eye(3, dtype=dtype))
+    np.testing.assert_array_equal(ones.colors, np.eye(3, dtype=np.float32) / np.float32(255))
+    np.testing.assert_array_equal(check_image("texture", np.eye(3, dtype=dtype))[..., 0], np.eye(3, dtype=np.uint8))
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (np.full((3, 3), 256), r"expected integers 0…255 \(or floats 0…1\), found 256 \(int64\)"),
+        (np.full((3, 3), -1, np.int16), r"expected integers 0…255 \(or floats 0…1\), found -1 \(int16\)"),
+        (np.full((3, 3), 2**64 - 1, np.uint64), r"found 18446744073709551615 \(uint64\)"),
+        (np.full((3, 3), 1.5), r"expected floats 0…1 \(or integers 0…255\), found 1.5$"),
+        (np.full((3, 3), -0.5, np.float32), r"expected floats 0…1 \(or integers 0…255\), found -0.5$"),
+        (np.full((3, 2), 0.5), "expected"),
+    ],
+)
+def test_colours_and_textures_beyond_their_range_are_refused(value, words):
+    with pytest.raises(InputError, match=f"colors: .*{words}"):
+        replace(TRIANGLE, colors=value)
+    with pytest.raises(InputError, match=f"texture: .*{words}"):
+        replace(TEXTURED, texture=value[None])
+
+
+def test_colours_may_be_off_by_a_rounding():
+    assert replace(TRIANGLE, colors=np.full((3, 3), 1.0000001)).colors.max() == 1
+    assert check_image("texture", np.full((2, 2, 3), 1.0000001, np.float64)).max() == 255
+
+
+def test_pil_textures_of_every_mode_are_colours():
+    red = Image.new("RGB", (4, 4), (255, 0, 0))
+    for image in (red, red.convert("RGBA"), red.quantize(4)):
+        assert (check_image("texture", image) == (255, 0, 0)).all()
+    with pytest.raises(InputError, match="found 4000"):
+        check_image("texture", Image.fromarray(np.full((4, 4), 4000, np.uint16)))
+    assert (check_image("texture", Image.new("LA", (4, 4), (51, 9))) == 51).all()

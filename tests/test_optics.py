@@ -101,7 +101,7 @@ def test_two_eyes_see_left_and_right_views_of_a_two_view_panel() -> None:
         (PANEL, dict(view=1, eye=(0, 1)), "either view .* or eye"),
         (PANEL, dict(view="1"), "view: expected a number, got '1'"),
         (PANEL, dict(view=math.nan), "view: expected a number"),
-        (PANEL, dict(eye=(0, 0)), "eye z: expected a number between 0"),
+        (PANEL, dict(eye=(0, 0)), "eye z: expected a number from 0.001"),
         (PANEL, dict(eye=(0, -5)), "eye z"),
         (PANEL, dict(eye=(math.inf, 5)), "eye x"),
         (PANEL, dict(eye=(1, 2, 3)), r"eye: expected \(x, z\) in mm"),

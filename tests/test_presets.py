@@ -144,7 +144,7 @@ HEAD = "source = 'x'\nwidth = 10\nheight = 10\n"
         ("source = ", "expected a display as TOML"),
         ("\xff\xfe\x00", "expected a display as TOML"),
         ("[" * 20000, "expected a display as TOML"),
-        ("width = 10\nheight = 10\n[mask]\nkind = 'anaglyph'", "source: missing"),
+        ("width = 10\nheight = 10\n[mask]\nkind = 'anaglyph'", "source: missing, expected where the numbers come from"),
         (HEAD, r"expected either a \[mask\] or a \[calibration\]"),
         (HEAD + "mask = 3", "mask: expected a table, found 3"),
         (HEAD + "depth = 3\n[mask]\nkind = 'anaglyph'", "unknown field 'depth'"),

@@ -195,7 +195,7 @@ def test_every_sample_is_the_same_each_time_and_within_the_cube(make):
         (lambda: engine_part(8), "size: expected a whole number in 32…1024, got 8"),
         (lambda: shells(64, 9), "count: expected a whole number in 1…8, got 9"),
         (lambda: surfel_cloud(1), "count: expected a whole number in 100…20000000, got 1"),
-        (lambda: surfel_cloud(1000, 2), "amplitude: expected a finite number"),
+        (lambda: surfel_cloud(1000, 2), "amplitude: expected a number from 0 to 0.9, got 2"),
     ],
 )
 def test_bad_arguments(make, words):

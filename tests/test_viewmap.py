@@ -102,7 +102,7 @@ def test_table_repeats_and_reverses() -> None:
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        (dict(views=0, table=np.zeros((1, 1, 3), int)), "views: expected a whole number ≥ 1, got 0"),
+        (dict(views=0, table=np.zeros((1, 1, 3), int)), "views: expected a whole number 1…4096, got 0"),
         (dict(views=True, table=np.zeros((1, 1, 3), int)), "views: expected a whole number"),
         (dict(views=2.0, table=np.zeros((1, 1, 3), int)), "views: expected a whole number"),
         (dict(views=2), "either a table or a phase"),

@@ -14,26 +14,31 @@ from .errors import InputError
 from .scene.scene import Scene
 
 MAX_SIDE = 65536
-MAX_VIEWS = 4096
+MAX_SHIFT = 1e9  # pixels: what engines still count in 32 bits
 
 
 def check_arguments(rig: Any, options: Any) -> None:
-    """Raise InputError unless these are a Rig of a sane number of views and Options, or None."""
+    """Raise InputError unless these are a Rig and Options, or None."""
     if rig is not None and not isinstance(rig, Rig):
         raise InputError(f"rig: expected a Rig, got {type(rig).__name__}")
-    if rig is not None and rig.views > MAX_VIEWS:
-        raise InputError(f"rig views: expected at most {MAX_VIEWS}, got {rig.views}")
     if options is not None and not isinstance(options, Options):
         raise InputError(f"options: expected Options(…), got {type(options).__name__}")
 
 
-def make_camera(rig: Rig, size: tuple[int, int]) -> Camera:
-    """The centre camera of a rig for pictures of `size` = (width, height)."""
+def make_camera(rig: Rig, size: tuple[int, int], aperture: float = 0.0) -> Camera:
+    """The centre camera of a rig for pictures of `size` = (width, height), seen through lenses of that `aperture`."""
     width, height = check_size(size)
     half = np.tan(np.deg2rad(rig.fov_y) / 2)
     fy = height / 2 / half
     aspect = rig.aspect if rig.aspect is not None else width / height
     fx = width / 2 / (aspect * half)
+    across, up = float(np.abs(rig.camera_offsets).max()) + aperture / 2, abs(rig.offset_y) + aperture / 2
+    reach = max(fx * across, fy * up) / rig.focal
+    if reach > MAX_SHIFT:
+        raise InputError(
+            f"rig: expected its outermost cameras to see a far point up to {MAX_SHIFT:g} pixels apart from the middle "
+            f"one, found {reach:g}; compare baseline (or aperture) and focal_distance"
+        )
     return Camera(rig.eye_from_world, float(fx), float(fy), width, height, rig.focal, rig.near_depth, rig.offset_y)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import FileError, InputError
-from .image import write_atomic, write_image
+from .image import as_path, write_atomic, write_image
 from .memory import check_memory
 
 
@@ -114,7 +114,7 @@ class ViewStack:
 
         A folder is created when its parent exists.
         """
-        path = Path(path)
+        path = as_path(path)
         if path.suffix == ".npz":
             arrays = {"color": self.color} | ({} if self.depth is None else {"depth": self.depth})
             return write_atomic(path, lambda file: np.savez_compressed(file, allow_pickle=False, **arrays))

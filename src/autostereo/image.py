@@ -16,6 +16,14 @@ from .errors import FileError, InputError
 IMAGE_SUFFIXES = (".png", ".webp", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 
 
+def as_path(path: object) -> Path:
+    """Return the name of a file as a Path, or raise InputError."""
+    try:
+        return Path(path)  # type: ignore[arg-type]
+    except TypeError:
+        raise InputError(f"path: expected the name of a file, got {type(path).__name__}") from None
+
+
 def write_atomic(path: str | os.PathLike[str], write: Callable[[BinaryIO], object]) -> Path:
     """Let `write` fill a temporary file in the folder of `path`, then rename it to `path`.
 
@@ -24,7 +32,7 @@ def write_atomic(path: str | os.PathLike[str], write: Callable[[BinaryIO], objec
     FileError
         The folder does not exist or cannot be written. Nothing is left behind.
     """
-    path = Path(path)
+    path = as_path(path)
     folder = path.parent
     if not folder.is_dir():
         raise FileError(f"{path}: the folder {folder} does not exist")
@@ -49,7 +57,7 @@ def write_image(path: str | os.PathLike[str], pixels: NDArray[np.uint8]) -> Path
     """
     from PIL import Image
 
-    path = Path(path)
+    path = as_path(path)
     if path.suffix.lower() not in IMAGE_SUFFIXES:
         raise InputError(f"{path}: expected an image suffix ({' '.join(IMAGE_SUFFIXES)}), got {path.suffix!r}")
     pixels = np.ascontiguousarray(pixels)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from . import methods
 from .cameras import check_arguments, check_in_view, culling_range, make_camera
+from .checks import FARTHEST, real_array
 from .display.display import Display
 from .display.optics import wanted_phase
 from .display.rig import Rig
@@ -25,8 +26,6 @@ from .methods import depth_of_field
 from .scene.scene import Scene
 from .scene.transfer import TransferFunction
 from .scene.volume import Volume
-
-FARTHEST = 1e30  # of a camera's offset, as in Rig
 
 
 def render(
@@ -141,7 +140,7 @@ class Renderer:
             raise InputError("rig: expected a Rig, got None")
         options = options or Options()
         schedule = methods.get_method(method, self.engine)
-        camera = make_camera(rig, size)
+        camera = make_camera(rig, size, options.aperture)
         check_in_view(self.scene, rig)
         offsets = rig.camera_offsets
         shape = (len(offsets), camera.height, camera.width)
@@ -176,10 +175,7 @@ class Renderer:
         """
         objects = list(self.scene.objects)
         if transform is not None:
-            try:
-                given = np.asarray(transform, dtype=np.float64)
-            except (TypeError, ValueError):
-                raise InputError(f"transform: expected matrices of numbers, got {type(transform).__name__}") from None
+            given = real_array("transform", transform, "matrices of numbers")
             each = [given] * len(objects) if given.ndim == 2 else list(given) if given.ndim == 3 else []
             if len(each) != len(objects):
                 raise InputError(f"transform: expected one (4, 4) matrix or {len(objects)} of them, got {given.shape}")
@@ -284,12 +280,9 @@ def warp(pictures: ViewStack, rig: Rig, offsets: Sequence[float] | NDArray[np.fl
     if not isinstance(rig, Rig):
         raise InputError(f"rig: expected a Rig, got {type(rig).__name__}")
     check_arguments(rig, None)
-    try:
-        places = np.array(offsets, np.float64)
-        with np.errstate(over="ignore"):  # beyond float32 is infinitely far
-            depths = np.array(pictures.depth, np.float32)
-    except (TypeError, ValueError):
-        raise InputError("pictures, offsets: expected depths and offsets that are numbers") from None
+    places = np.array(real_array("offsets", offsets, "numbers"), np.float64)
+    with np.errstate(over="ignore"):  # beyond float32 is infinitely far
+        depths = np.array(real_array("pictures", pictures.depth, "depths that are numbers"), np.float32)
     if places.shape != (pictures.views,) or not (np.abs(places) < FARTHEST).all():
         raise InputError(f"offsets: expected {pictures.views} numbers, one a picture, got {offsets!r}")
     if not (depths > 0).all():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .checks import LARGEST, SMALLEST, check_reach, real_array
 from .errors import InputError
 
 Array = NDArray[np.float64]
@@ -14,17 +15,23 @@ def as_transform(matrix: ArrayLike | None, name: str = "transform") -> Array:
     """Return `matrix` as a checked (4, 4) float64 affine transform; None means the identity."""
     if matrix is None:
         return np.eye(4)
-    try:
-        m = np.array(matrix, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: expected a 4×4 matrix of numbers, got {type(matrix).__name__}") from None
+    m = real_array(name, matrix, "a 4×4 matrix of numbers").astype(np.float64)
     if m.shape != (4, 4):
         raise InputError(f"{name}: expected shape (4, 4), got {m.shape}")
     if not np.isfinite(m).all():
         raise InputError(f"{name}: expected finite numbers, found NaN or infinity")
+    check_reach(name, m)
     if not np.array_equal(m[3], (0.0, 0.0, 0.0, 1.0)):
         raise InputError(f"{name}: expected an affine matrix with last row (0, 0, 0, 1), got {m[3].tolist()}")
     return m
+
+
+def check_world(name: str, transform: Array, points: Array) -> None:
+    """Raise InputError when `transform` may take one of points (N, 3) beyond ±LARGEST."""
+    farthest = np.maximum(-points.min(axis=0, initial=0.0), points.max(axis=0, initial=0.0))
+    reach = np.abs(transform[:3, :3]) @ farthest + np.abs(transform[:3, 3])
+    if reach.max() > LARGEST:
+        raise InputError(f"{name}: expected places in the world within ±{LARGEST:g}, found up to ±{reach.max():g}")
 
 
 def translation(x: float, y: float, z: float) -> Array:
@@ -76,12 +83,13 @@ def eye_from_world(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> Arr
     position = np.asarray(position, dtype=np.float64)
     forward = np.asarray(target, dtype=np.float64) - position
     distance = np.linalg.norm(forward)
-    if distance == 0:
+    if distance < SMALLEST:
         raise InputError("rig: position and target must differ")
     forward = forward / distance
-    right = np.cross(forward, np.asarray(up, dtype=np.float64))
+    up = np.asarray(up, dtype=np.float64)
+    right = np.cross(forward, up / np.linalg.norm(up))
     length = np.linalg.norm(right)
-    if length < 1e-12 * max(1.0, float(np.linalg.norm(np.asarray(up, dtype=np.float64)))):
+    if length < 1e-12:
         raise InputError("rig: up must not be parallel to the line of sight")
     right = right / length
     rows = np.stack([right, np.cross(right, forward), forward])

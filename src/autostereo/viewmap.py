@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .checks import check_views, real_array
 from .errors import InputError
 
 CELL_MODES = (0, 1, 2, 3, 4)
@@ -70,8 +71,7 @@ class ViewMap:
     reverse: bool = False
 
     def __post_init__(self) -> None:
-        if isinstance(self.views, bool) or not isinstance(self.views, (int, np.integer)) or self.views < 1:
-            raise InputError(f"views: expected a whole number ≥ 1, got {self.views!r}")
+        object.__setattr__(self, "views", check_views(self.views))
         if (self.table is None) == (self.offsets is None):
             raise InputError("view map: give either a table or a phase (a, b, offsets)")
         if self.table is not None:
@@ -80,7 +80,7 @@ class ViewMap:
             self._check_phase()
 
     def _check_table(self) -> None:
-        table = np.asarray(self.table)
+        table = real_array("table", self.table, "an array of integers")
         if table.ndim != 3 or table.shape[2] != 3 or 0 in table.shape:
             raise InputError(f"table: expected shape (h, w, 3), got {table.shape}")
         if not np.issubdtype(table.dtype, np.integer):
@@ -94,7 +94,7 @@ class ViewMap:
         object.__setattr__(self, "table", np.ascontiguousarray(table, dtype=np.int32))
 
     def _check_phase(self) -> None:
-        offsets = np.ascontiguousarray(self.offsets, dtype=np.float64)
+        offsets = np.ascontiguousarray(real_array("offsets", self.offsets), dtype=np.float64)
         if offsets.ndim != 2 or offsets.shape[1] != 3 or offsets.shape[0] == 0:
             raise InputError(f"offsets: expected shape (cells, 3), got {offsets.shape}")
         if not (np.isfinite(offsets).all() and np.isfinite([self.a, self.b]).all()):

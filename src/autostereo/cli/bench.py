@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from . import common
+from . import common, outputs
 
 KERNELS = {  # by which one sees whether this run compiles
     "mesh": ("draw_views", "draw_panel"),
@@ -59,7 +59,7 @@ def bench(
     if name not in KERNELS:
         raise InputError(f"bench: expected one of {', '.join(KERNELS)}, got {name!r}")
     if json is not None:
-        common.check_output(json, (".json",))
+        outputs.check_output(json, (".json",))
     if plots is not None and name != "papers":
         raise InputError(f"bench --plots: only papers has charts, got {name!r}")
     from .benchmarks import report

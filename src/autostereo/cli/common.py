@@ -1,12 +1,8 @@
-"""What the verbs share: options, reading of sizes and displays, output checks, messages, progress."""
+"""What the verbs share: options, reading of sizes and displays, messages, progress."""
 
 from __future__ import annotations
 
-import os
-import secrets
-import shutil
 import sys
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -15,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import FileError, InputError
+from ..errors import FileError, InputError, MemoryLimitError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,11 +19,11 @@ if TYPE_CHECKING:
 
     from ..display.display import Display
     from ..display.rig import Rig
+    from ..engines.options import Options
     from ..scene.scene import Scene
     from ..scene.volume import Volume
 
 MAX_SIDE = 32_768  # what a Display takes
-MAX_VIEWS = 4_096
 
 
 class State:
@@ -151,69 +147,10 @@ def parse_color(text: str, name: str = "--background") -> tuple[float, float, fl
 
 def check_views(views: int | None) -> None:
     """Refuse a view count that is no count."""
+    from ..checks import MAX_VIEWS
+
     if views is not None and not 1 <= views <= MAX_VIEWS:
         raise InputError(f"--views: expected a number from 1 to {MAX_VIEWS}, got {views}")
-
-
-# --- output --------------------------------------------------------------------------------------------------------
-def check_output(path: Path, suffixes: tuple[str, ...] = ()) -> Path:
-    """Refuse, before the long work, a path that could not be written after it.
-
-    With `suffixes` it is to be a file, without them a folder.
-    """
-    if suffixes and path.is_dir():
-        raise FileError(f"{path}: expected a file name, found a folder")
-    if not suffixes and path.exists() and not path.is_dir():
-        raise FileError(f"{path}: expected a folder, found a file")
-    if suffixes and path.suffix.lower() not in suffixes:
-        raise InputError(f"{path}: expected a name ending in {' '.join(suffixes)}, got {path.suffix or 'no suffix'}")
-    folder = path.parent
-    if not folder.is_dir():
-        raise FileError(f"{path}: the folder {folder} does not exist")
-    try:
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise FileError(f"{path}: the folder {folder} is not writable ({error.strerror or error})") from error
-    return path
-
-
-def check_image(path: Path) -> Path:
-    """The same for an image file."""
-    from ..image import IMAGE_SUFFIXES
-
-    return check_output(path, IMAGE_SUFFIXES)
-
-
-@contextmanager
-def whole_folder(path: Path, stale: str = "") -> Iterator[Path]:
-    """Give a temporary folder to fill; when all went well its files appear in `path`, else nothing does.
-
-    In a folder that exists, files of the same name are replaced, and in a folder of views (it holds a rig.json)
-    others that match the pattern `stale` are removed.
-    """
-    check_output(path)
-    temporary = path.parent / f".part-{secrets.token_hex(4)}"  # no suffix: it is a folder
-    try:
-        temporary.mkdir()
-        yield temporary
-        if path.is_dir():
-            made = sorted(temporary.iterdir())
-            ours = (path / "rig.json").exists()  # a folder of this program's
-            leftovers = list(path.glob(stale)) if stale and ours else []
-            for item in made:
-                os.replace(item, path / item.name)
-            for old in leftovers:
-                if old.name not in {item.name for item in made}:
-                    old.unlink()
-        else:
-            os.replace(temporary, path)
-    except OSError as error:
-        if isinstance(error, FileError):
-            raise
-        raise FileError(f"{path}: cannot be written ({error.strerror or error})") from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
 
 
 # --- messages ------------------------------------------------------------------------------------------------------
@@ -257,6 +194,19 @@ def announce_compilation(engine: str, *kernels: str) -> None:
 
     if not is_compiled(*kernels):
         note("compiling kernels (once for each kind of picture, up to a minute)…")
+
+
+def note_reuse(picture: Any, draw: Callable[..., Any], options: Options) -> None:
+    """Say which share of the samples was reused, and how near the picture comes to `draw` with exact shading."""
+    if picture.reused is None:
+        return
+    said = f"{picture.reused:.0%} of the samples have a nearby view's colour"
+    try:
+        with working("comparing with exact shading"):
+            exact = draw(options=replace(options, shading="exact"))
+        note(f"{said}; PSNR {picture.psnr(exact):.1f} dB against exact shading")
+    except MemoryLimitError:  # the picture is good, there is no room for a second one
+        note(said)
 
 
 # --- what the verbs work on ----------------------------------------------------------------------------------------
@@ -337,6 +287,8 @@ class VolumeOptions:
         file = self.transfer is not None and self.transfer.lower().endswith(".json")
         loaded = TransferFunction.load(self.transfer) if file else None  # type: ignore[arg-type]
 
+        self._check_iso([item for item in scene.objects if isinstance(item, Volume)])
+
         def seen(volume: Volume) -> Volume:
             changes: dict[str, Any] = {"mode": self.mode or ("composite" if self.iso is None else "iso")}
             if self.iso is not None:
@@ -346,6 +298,14 @@ class VolumeOptions:
             return replace(volume, **changes)
 
         return replace(scene, objects=tuple(seen(x) if isinstance(x, Volume) else x for x in scene.objects))
+
+
+    def _check_iso(self, volumes: list[Volume]) -> None:
+        """Refuse a value that no volume reaches: there would be nothing to see."""
+        if self.iso is None or any(low <= self.iso <= high for low, high in (item.value_range for item in volumes)):
+            return
+        ranges = ", ".join(f"{low:g}…{high:g}" for low, high in (item.value_range for item in volumes))
+        raise InputError(f"--iso: expected a value within the volume's, {ranges}, got {self.iso:g}")
 
 
 def load_scene(paths: list[Path], background: str | None, volumes: VolumeOptions | None = None) -> Scene:

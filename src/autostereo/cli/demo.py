@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from . import common
+from . import common, outputs
 from .common import say
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def demo(
       autostereo demo
       autostereo demo -o /tmp/demo
     """
-    with common.whole_folder(output) as folder:
+    with outputs.whole_folder(output) as folder:
         common.announce_compilation("cpu", *KERNELS)
         from ..render import Renderer
 

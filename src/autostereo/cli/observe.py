@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from . import common
-from .common import say
+from . import common, outputs
+from .common import note, say
 
 
 def observe(
@@ -31,7 +31,9 @@ def observe(
     """Compute what an eye in front of a panel sees.
 
     The display's optics choose one sub-pixel for each place, colour and lens. Name the display that the picture was
-    made for, with the same --views, --swap and --continuous.
+    made for, with the same --views, --swap and --continuous. A picture of another size is taken for that of a display
+    of this size with the same lenses and pixels, as `render --size` makes it, and a line says so; one that was scaled
+    afterwards shows wrong views.
 
     Examples:
       autostereo observe panel.png -d looking-glass-portrait --view 20 -o left.png
@@ -43,12 +45,15 @@ def observe(
     if eye is not None:
         x, z = common.parse_numbers(eye, "--eye", 2)
         place = (x, z)
-    common.check_image(output)
+    outputs.check_image(output)
+    outputs.check_apart(output, panel)
     where = common.load_display(display, None, swap, views, continuous)
     pixels = common.load_picture(panel)
     width, height = where.picture_size
     if pixels.shape[:2] != (height, width) and where.viewmap is not None:
         where = where.resized(pixels.shape[1], pixels.shape[0])
+        size = f"{where.width}×{where.height}"
+        note(f"{panel}: {size} pixels, where {where.name} has {width}×{height}: taken for a display of {size} pixels")
     from ..frame import Panel
     from ..image import write_image
     from ..render import observe as look

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError
-from . import common
+from . import common, outputs
 from .common import note, say
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def pattern(
     if step is not None and not 0 < abs(step) * strips < 2:
         raise InputError(f"--step: expected a small number other than 0, got {step:g}")
     where = common.load_display(display, size, swap, views)
-    common.check_image(output)
+    outputs.check_image(output)
     with common.working("drawing"):
         if kind in STEPS:
             sweep = make_sweep(where, kind, strips, width)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..errors import InputError
-from . import common
+from ..errors import FileError, InputError
+from . import common, outputs
 from .common import say
-from .reuse import note_reuse
 
 if TYPE_CHECKING:
     from ..display.display import Display
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 def quilt(
     inputs: common.Inputs,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Output; _qs…x…a… is added to the name.")
+        str | None, typer.Option("--output", "-o", metavar="OUT", help="File; _qs…x…a… is added to it. Or folder.")
     ] = None,
     display: common.OptionalDisplayName = None,
     grid: Annotated[str | None, typer.Option("--grid", metavar="CxR", help="Tiles across and up.")] = None,
@@ -55,7 +56,7 @@ def quilt(
     """Render a quilt: all views tiled into one picture.
 
     The leftmost view stands at the bottom left. The layout is the display's own, or --grid with --view-size; it
-    becomes part of the file's name.
+    becomes part of the file's name. In a folder that exists the file is called after the first input.
 
     Examples:
       autostereo quilt bunny.ply --display looking-glass-portrait
@@ -75,7 +76,8 @@ def quilt(
     rig = common.load_camera(camera)
     from ..encoders.quilt import quilt_path
 
-    path = common.check_image(quilt_path(output or Path(f"{common.stem(inputs[0])}.png"), layout))
+    path = outputs.check_image(quilt_path(_place(output, f"{common.stem(inputs[0])}.png"), layout))
+    outputs.check_apart(path, *inputs)
     scene = common.load_scene(inputs, background, volumes)
     rig = _frame(scene, where, layout, side) if rig is None else rig.with_views(layout.views)
     if rig.aspect is None:
@@ -85,13 +87,24 @@ def quilt(
     from ..render import render_views
 
     common.announce_compilation(engine, *kernels_for(scene, None, options, method, rig.views))
+    drawn = partial(render_views, scene, rig, layout.tile, method=method, engine=engine)
     with common.working(f"rendering {rig.views} views"):
-        stack = render_views(scene, rig, layout.tile, method=method, engine=engine, options=options)
-    size = layout.tile
-    note_reuse(stack, options, lambda own: render_views(scene, rig, size, method=method, engine=engine, options=own))
+        stack = drawn(options=options)
+    common.note_reuse(stack, drawn, options)
     with common.working("writing"):
         save_quilt(path, stack, layout)
     say(f"{path}  {layout.width}×{layout.height}")
+
+
+def _place(output: str | None, own: str) -> Path:
+    """Where the quilt goes before its layout is added to the name: `own`, in a folder if that is what `output` is."""
+    if output is None:
+        return Path(own)
+    if Path(output).is_dir():
+        return Path(output) / own
+    if output.endswith(("/", os.sep)):
+        raise FileError(f"{output}: no such folder")
+    return Path(output)
 
 
 def choose_layout(display: Display | None, grid: str | None, view_size: str | None, aspect: float | None) -> Quilt:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 
-from . import common
+from . import common, outputs
 from .common import note, say
-from .reuse import note_reuse
 
 
 def render(
@@ -68,7 +68,9 @@ def render(
     volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
     common.check_side(side, camera)
     rig = common.load_camera(camera)
-    path = common.check_image(output or Path(f"{common.stem(inputs[0])}_{common.slug(display)}.png"))
+    ending = "_2x2" if where.layout == "leia-2x2" else ""  # by which its device knows it
+    path = outputs.check_image(output or Path(f"{common.stem(inputs[0])}_{common.slug(display)}{ending}.png"))
+    outputs.check_apart(path, *inputs)
     scene = common.load_scene(inputs, background, volumes)
 
     from ..display.rig import Rig
@@ -78,11 +80,14 @@ def render(
     rig = rig or Rig.frame(scene, where, side)
     kept = replace(options, depth=where.layout == "rgbd")  # as Renderer does for displays of 2D + depth
     common.announce_compilation(engine, *kernels_for(scene, where.viewmap, kept, method, rig.views))
+    drawn = partial(draw, scene, where, rig, method=method, engine=engine)
     start = perf_counter()
     with common.working("rendering"):
-        panel = draw(scene, where, rig, method=method, engine=engine, options=options)
+        panel = drawn(options=options)
     note(f"rendered in {perf_counter() - start:.2f} s")
-    note_reuse(panel, options, lambda exact: draw(scene, where, rig, method=method, engine=engine, options=exact))
+    common.note_reuse(panel, drawn, options)
     with common.working("writing"):
         panel.save(path)
+    if not path.stem.endswith(ending):
+        note(f"{path}: its device wants a name that ends in {ending}, such as {path.stem}{ending}{path.suffix}")
     say(f"{path}  {panel.width}×{panel.height}")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError
-from . import common
+from . import common, outputs
 
 if TYPE_CHECKING:
     from ..display.rig import Rig
@@ -85,9 +85,9 @@ def simulate(
         raise InputError("--picture: shows views, not --depth-of-field")
     for path, suffixes in ((json, (".json",)), (chart, (".png", ".svg", ".pdf"))):
         if path is not None:
-            common.check_output(path, suffixes)
+            outputs.check_output(path, suffixes)
     if picture is not None:
-        common.check_image(picture)
+        outputs.check_image(picture)
     from ..simulator import output
     from ..simulator.kernels.compiling import is_compiled
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..errors import DependencyError, InputError
-from . import common
+from . import common, outputs
 from .common import say
-from .reuse import note_reuse
 
 if TYPE_CHECKING:
     from ..display.rig import Rig
@@ -91,7 +91,8 @@ def views(
     volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
     common.check_side(side, camera)
     rig = common.load_camera(camera)
-    common.check_output(output, (suffix,) if suffix else ())
+    outputs.check_output(output, (suffix,) if suffix else ())
+    outputs.check_apart(output, *inputs)
     scene = common.load_scene(inputs, background, volumes)
     rig = common.frame_views(scene, rig, views, pixels, display, side)
     if lens is not None:
@@ -101,9 +102,10 @@ def views(
     from ..render import render_views
 
     common.announce_compilation(engine, *kernels_for(scene, None, options, method, rig.views))
+    drawn = partial(render_views, scene, rig, pixels, method=method, engine=engine)
     with common.working(f"rendering {rig.views} views"):
-        stack = render_views(scene, rig, pixels, method=method, engine=engine, options=options)
-    note_reuse(stack, options, lambda own: render_views(scene, rig, pixels, method=method, engine=engine, options=own))
+        stack = drawn(options=options)
+    common.note_reuse(stack, drawn, options)
     write_views(output, stack, rig)
 
 
@@ -118,7 +120,7 @@ def write_views(output: Path, stack: ViewStack, rig: Rig) -> None:
         elif suffix:
             stack.save(output)
         else:
-            with common.whole_folder(output, stale="view_*.png") as folder:
+            with outputs.whole_folder(output, stale="view_*.png") as folder:
                 stack.save(folder)
                 rig.save(folder / "rig.json")
     say(f"{output}  {stack.views} views of {stack.width}×{stack.height}")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import InputError
-from . import common
+from . import common, outputs
 from .common import note, say
 from .views import ANIMATIONS, check_animation, write_views
 
@@ -61,7 +61,8 @@ def warp(
     if where is not None and where.viewmap is None and to_panel:
         raise InputError(f"{where.name}: a {where.layout} picture is not interlaced; leave out --display for views")
     common.check_views(views)
-    common.check_output(output, (suffix,) if suffix else ())
+    outputs.check_output(output, (suffix,) if suffix else ())
+    outputs.check_apart(output, picture, depth)
     rig = common.load_camera(camera)
     field = rig.fov_y if rig is not None else 36.0 if fov is None else fov
     taken = read_rgbd(picture, depth, unit)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from . import common
+from . import common, outputs
 from .common import say
 
 
@@ -55,7 +55,8 @@ def weave(
         )
     if where.viewmap is None:
         raise InputError(f"{where.name}: a {where.layout} picture is not woven from a quilt")
-    common.check_image(output)
+    outputs.check_image(output)
+    outputs.check_apart(output, quilt)
     common.announce_compilation("cpu", "_weave")
     pixels = common.load_picture(quilt, alpha=True)
     from ..engines.cpu.gather import weave as draw

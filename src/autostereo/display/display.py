@@ -11,22 +11,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import FOV_RANGE, check_number, check_views
 from ..errors import InputError, UnsupportedError
 from ..viewmap import ViewMap
 from . import masks
 from .calibration import Calibration, read_calibration
-from .masks import check_flag, check_number, check_size, check_views
+from .layouts import CONE_DEG, EYES_DEG, PACKED, STEREO, Packing
+from .masks import check_flag, check_size
 from .quilt import Quilt
 
-PACKED = ("side-by-side", "side-by-side-half", "top-bottom", "top-bottom-half")
-LAYOUTS = ("interlaced", *PACKED, "anaglyph", "rgbd")
-STEREO_LAYOUTS = (*PACKED, *masks.TWO_VIEW_TABLES)
+LAYOUTS = ("interlaced", *PACKED)
+STEREO_LAYOUTS = (*STEREO, *masks.TWO_VIEW_TABLES)
 
 COMFORT = 5.0  # px between adjacent views (displays.md 3.4)
 FOV_Y = 36.0
 LOOKING_GLASS_FOV_Y = 14.0
-CONE_DEG = 30.0  # of a multi-view panel whose optics are not given
-EYES_DEG = 6.0  # two eyes 63 mm apart, seen from 600 mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +40,7 @@ class Display:
     viewmap : ViewMap, optional
         The mask of an interlaced panel; None for the other layouts. It holds V, `continuous` and `reverse`.
     layout : str
-        "interlaced", or how the views of a display without a mask are packed: "side-by-side", "side-by-side-half",
-        "top-bottom", "top-bottom-half", "anaglyph", "rgbd".
+        "interlaced", or how the views of a display without a mask are packed: a key of `layouts.PACKED`.
     eyes_swapped : bool
         The right eye's picture comes first; for layouts without a mask (see `reverse`).
     flip_x, flip_y : bool
@@ -98,27 +96,29 @@ class Display:
             put(self, name, check_flag(name, getattr(self, name)))
         if self.viewmap is not None and self.eyes_swapped:
             raise InputError("eyes_swapped: an interlaced display is reversed by its view map")
-        half = {"side-by-side-half": self.width, "rgbd": self.width, "top-bottom-half": self.height}
-        if half.get(self.layout, 0) % 2:
-            raise InputError(f"{self.layout}: expected an even number of pixels to halve, got {half[self.layout]}")
-        put(self, "fov_y", check_number("fov_y", self.fov_y, 0.0, 179.0))
-        put(self, "comfort", check_number("comfort", self.comfort, 0.0, 1e6))
-        put(self, "cone_deg", check_number("cone_deg", self.cone_deg, 0.0, 180.0))
+        self._packing.check(self.layout, self.width, self.height)
+        put(self, "fov_y", check_number("fov_y", self.fov_y, *FOV_RANGE))
+        put(self, "comfort", check_number("comfort", self.comfort, 1e-3, 1e6))
+        put(self, "cone_deg", check_number("cone_deg", self.cone_deg, 0.001, 179.0))
         if self.size_mm is not None:
             put(self, "size_mm", _pair_mm(self.size_mm))
         if self.distance_mm is not None:
-            put(self, "distance_mm", check_number("distance_mm", self.distance_mm, 0.0, 1e9))
+            put(self, "distance_mm", check_number("distance_mm", self.distance_mm, 1e-3, 1e9))
         if self.quilt is not None and self.quilt.views < self.views:
             raise InputError(f"quilt: {self.quilt.columns}×{self.quilt.rows} tiles cannot hold {self.views} views")
 
     # --- what it is ------------------------------------------------------------------------------------
 
     @property
+    def _packing(self) -> Packing:
+        return PACKED.get(self.layout, Packing())
+
+    @property
     def views(self) -> int:
         """V: number of views a picture for this display is made of."""
         if self.viewmap is not None:
             return self.viewmap.views
-        return 1 if self.layout == "rgbd" else 2
+        return self._packing.views
 
     @property
     def continuous(self) -> bool:
@@ -138,19 +138,12 @@ class Display:
     @property
     def view_size(self) -> tuple[int, int]:
         """Width and height in pixels of one view as this layout packs it; half formats and rgbd are anamorphic."""
-        if self.layout in ("side-by-side-half", "rgbd"):
-            return (self.width // 2, self.height)
-        if self.layout == "top-bottom-half":
-            return (self.width, self.height // 2)
-        return (self.width, self.height)
+        return self._packing.view_size(self.width, self.height)
 
     @property
     def picture_size(self) -> tuple[int, int]:
         """Width and height in pixels of the picture the device takes; full side-by-side and top-bottom double it."""
-        return (
-            self.width * (2 if self.layout == "side-by-side" else 1),
-            self.height * (2 if self.layout == "top-bottom" else 1),
-        )
+        return self._packing.picture_size(self.width, self.height)
 
     @property
     def comfort_size(self) -> tuple[int, int]:
@@ -158,6 +151,8 @@ class Display:
 
         A mask leaves each view fewer pixels than the panel has, so that the limit is on the careful side there.
         """
+        if self._packing.views > 2:  # tiles too
+            return self.view_size
         return self.quilt.tile if self.quilt is not None else (self.width, self.height)
 
     def view_of_subpixel(self) -> NDArray[np.int32] | NDArray[np.float64]:
@@ -333,7 +328,9 @@ class Display:
         """Two views for a panel of `width` × `height` pixels; `reverse` puts the right eye's picture first.
 
         Full "side-by-side" and "top-bottom" pictures are twice the panel's size (`picture_size`), the "-half" ones have
-        anamorphic views. "row-interleaved", "column-interleaved" and "checkerboard" are masks.
+        anamorphic views. "frame-packing-720p" and "-1080p" are HDMI's, for 1280×720 and 1920×1080 pixels. "leia-2x2"
+        is four views of half the panel's size, the two left ones above. "row-interleaved", "column-interleaved" and
+        "checkerboard" are masks.
         """
         if layout not in STEREO_LAYOUTS:
             raise InputError(f"layout: expected one of {', '.join(STEREO_LAYOUTS)}, got {layout!r}")
@@ -353,13 +350,13 @@ class Display:
 
         `reverse` inverts the depth.
         ."""
-        return replace(_packed("rgbd", "rgbd", (width, height), reverse), comfort=COMFORT, cone_deg=CONE_DEG)
+        return _packed("rgbd", "rgbd", (width, height), reverse)
 
 
 def _pair_mm(value: Any) -> tuple[float, float]:
     if isinstance(value, (str, bytes)) or not isinstance(value, (Sequence, np.ndarray)) or len(value) != 2:
         raise InputError(f"size_mm: expected (width, height) in millimetres, got {value!r}")
-    return (check_number("size_mm width", value[0], 0.0, 1e9), check_number("size_mm height", value[1], 0.0, 1e9))
+    return (check_number("size_mm width", value[0], 1e-3, 1e9), check_number("size_mm height", value[1], 1e-3, 1e9))
 
 
 def _two_view_comfort(width: Any) -> float:
@@ -376,8 +373,9 @@ def _masked(name: str, size: tuple[Any, Any], viewmap: ViewMap, reverse: Any) ->
 
 
 def _packed(name: str, layout: str, size: tuple[Any, Any], reverse: Any) -> Display:
-    comfort = _two_view_comfort(size[0])
-    return Display(name, *size, layout=layout, eyes_swapped=reverse, cone_deg=EYES_DEG, comfort=comfort)
+    packing = PACKED[layout]
+    comfort = _two_view_comfort(size[0]) if packing.views == 2 else COMFORT
+    return Display(name, *size, layout=layout, eyes_swapped=reverse, cone_deg=packing.cone_deg, comfort=comfort)
 
 
 def looking_glass(calibration: Calibration, viewmap: ViewMap, **fields: Any) -> Display:

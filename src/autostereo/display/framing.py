@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import FARTHEST, SMALLEST, real_array
 from ..errors import InputError
 from .display import Display
 from .rig import Rig
 
 MARGIN = 0.05  # share of the half-window left free at every side
 CLOSEST = 1.25  # least distance from the bounds' centre, in half-depths of the bounds: near ≥ a fifth of it
-LARGEST = 1e15
 # where cameras may stand, and which way is up: (towards them, up)
 SIDES = {
     "front": ((0, 0, 1), (0, 1, 0)),
@@ -196,14 +196,12 @@ def _limits(display: Display, rig: Rig | None = None) -> tuple[float, float]:
 
 def _bounds(scene: Any) -> NDArray[np.float64]:
     """Checked bounds (2, 3): finite, ordered, of a size that float64 can place cameras around."""
-    try:
-        bounds = np.array(getattr(scene, "bounds", scene), dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"bounds: expected numbers of shape (2, 3), got {type(scene).__name__}") from None
+    given = real_array("bounds", getattr(scene, "bounds", scene), "numbers of shape (2, 3)")
+    bounds = np.array(given, dtype=np.float64)
     if bounds.shape != (2, 3):
         raise InputError(f"bounds: expected shape (2, 3), got {bounds.shape}")
-    if not np.isfinite(bounds).all() or np.abs(bounds).max() > LARGEST:
-        raise InputError(f"bounds: expected finite coordinates up to {LARGEST:g}, got {bounds.tolist()}")
+    if not np.isfinite(bounds).all() or np.abs(bounds).max() > FARTHEST:
+        raise InputError(f"bounds: expected finite coordinates up to {FARTHEST:g}, got {bounds.tolist()}")
     if (bounds[0] > bounds[1]).any():
         raise InputError(f"bounds: expected the lower corner first, got {bounds.tolist()}")
     return bounds
@@ -215,8 +213,8 @@ def _box(scene: Any) -> tuple[tuple[float, float, float], tuple[float, float, fl
     center = (bounds[0] + bounds[1]) / 2
     half = (bounds[1] - bounds[0]) / 2
     least = 1e-6 * float(np.abs(center).max())
-    if half.max() <= least or half.max() < 1e-30:
-        half = np.maximum(half, least if least >= 1e-30 else 0.5)
+    if half.max() <= least or half.max() < SMALLEST:
+        half = np.maximum(half, least if least >= SMALLEST else 0.5)
     x, y, z = center.tolist()
     hx, hy, hz = half.tolist()
     return (x, y, z), (hx, hy, hz)

@@ -11,19 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import check_number, check_views, real_array
 from ..errors import InputError
 from ..viewmap import ViewMap
 
 PITCHES = ("pixel", "subpixel")
 WAVELENGTH_VIEWS = 8
 MAX_SIZE = 32768  # pixels a side
-
-
-def check_views(views: Any) -> int:
-    """Return `views` as an int, or raise InputError."""
-    if isinstance(views, (bool, np.bool_)) or not isinstance(views, (int, np.integer)) or not 1 <= views <= 4096:
-        raise InputError(f"views: expected a whole number 1…4096, got {views!r}")
-    return int(views)
 
 
 def check_size(name: str, value: Any) -> int:
@@ -38,15 +32,6 @@ def check_flag(name: str, value: Any) -> bool:
     if not isinstance(value, (bool, np.bool_)):
         raise InputError(f"{name}: expected True or False, got {value!r}")
     return bool(value)
-
-
-def check_number(name: str, value: Any, low: float, high: float) -> float:
-    """Return `value` as a float with low < value < high, or raise InputError."""
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
-        raise InputError(f"{name}: expected a number, got {value!r}")
-    if not low < value < high:
-        raise InputError(f"{name}: expected a number between {low:g} and {high:g}, got {value!r}")
-    return float(value)
 
 
 def lenticular(views: int, per: str) -> ViewMap:
@@ -94,9 +79,9 @@ def slanted(
     PMR 2020, equations 14–15; van Berkel 1999. Square pixels are assumed.
     """
     views = check_views(views)
-    p_u = check_number("lens_pitch", lens_pitch, 0.0, 1e9)
-    p_h = check_number("subpixel_pitch", subpixel_pitch, 0.0, 1e9)
-    alpha = math.radians(check_number("slant_deg", slant_deg, -90.0, 90.0))
+    p_u = check_number("lens_pitch", lens_pitch, 1e-9, 1e9)
+    p_h = check_number("subpixel_pitch", subpixel_pitch, 1e-9, 1e9)
+    alpha = math.radians(check_number("slant_deg", slant_deg, -89.9, 89.9))
     start = check_number("phase", phase, -1e6, 1e6)
     period = p_u / (p_h * math.cos(alpha))
     if not 1e-3 < period < 1e9:
@@ -114,11 +99,7 @@ def slanted(
 def table(views: int, values: Any) -> ViewMap:
     """View map of a user's table (h, w, 3) of view indices, repeated over the panel."""
     views = check_views(views)
-    try:
-        array = np.asarray(values)
-    except ValueError:
-        raise InputError("table: expected an array of shape (h, w, 3), got rows of unequal length") from None
-    return ViewMap(views, array)
+    return ViewMap(views, real_array("table", values, "an array of integers of shape (h, w, 3)"))
 
 
 TWO_VIEW_TABLES: dict[str, list[list[int]]] = {  # (h, w): 0 is the left eye's picture

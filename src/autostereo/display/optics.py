@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import check_number
 from ..errors import InputError, UnsupportedError
 from .display import Display
-from .masks import check_number
 
 
 def wanted_phase(
@@ -60,7 +60,7 @@ def zone_coordinate(display: Display, eye: Any) -> NDArray[np.float64]:
     if isinstance(eye, (str, bytes)) or not isinstance(eye, (Sequence, np.ndarray)) or len(eye) != 2:
         raise InputError(f"eye: expected (x, z) in mm, got {eye!r}")
     x_eye = check_number("eye x", eye[0], -1e9, 1e9)
-    z_eye = check_number("eye z", eye[1], 0.0, 1e9)
+    z_eye = check_number("eye z", eye[1], 1e-3, 1e9)
     slope = (x_eye - column_mm(display)) / z_eye
     if display.distance_mm is not None:
         slope = slope + column_mm(display) / display.distance_mm
@@ -86,7 +86,7 @@ def eye_at(display: Display, view: float, z: float | None = None) -> tuple[float
         if display.distance_mm is None and display.size_mm is None:
             raise InputError(f"eye: {display.name} has no size; give it one with .physical(size_mm=(width, height))")
         z = display.distance_mm or 3 * math.hypot(*(display.size_mm or (0.0, 0.0)))
-    z = check_number("eye z", z, 0.0, 1e9)
+    z = check_number("eye z", z, 1e-3, 1e9)
     return ((2 * (u + 0.5) / display.views - 1) * math.tan(math.radians(display.cone_deg) / 2) * z, z)
 
 

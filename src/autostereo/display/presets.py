@@ -19,11 +19,12 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from ..checks import check_views
 from ..errors import AutostereoError, FileError, InputError
 from . import masks
 from .calibration import Calibration, read_calibration
 from .display import Display, looking_glass
-from .masks import check_size, check_views
+from .masks import check_size
 from .quilt import Quilt
 
 if sys.version_info >= (3, 11):
@@ -52,6 +53,11 @@ FIELDS = {
 }  # fmt: skip
 TABLES = {"mask", "calibration", "quilt", "optics"}
 TEXTS = {"title", "source", "note", "serial"}
+EXPECTED = {
+    "width": "the panel's columns of pixels",
+    "height": "the panel's rows of pixels",
+    "source": 'where the numbers come from, such as source = "measured, 2026-01"',
+}  # fields that every file has
 MAX_BYTES = 1 << 20
 
 
@@ -127,9 +133,9 @@ def _parse(where: str, raw: bytes) -> dict[str, Any]:
         kind = dict if key in TABLES else str if key in TEXTS else None
         if kind is not None and not isinstance(value, kind):
             raise FileError(f"{where}: {key}: expected {'a table' if kind is dict else 'a string'}, found {value!r}")
-    for key in ("width", "height", "source"):
+    for key in EXPECTED:
         if key not in fields:
-            raise FileError(f"{where}: {key}: missing")
+            raise FileError(f"{where}: {key}: missing, expected {EXPECTED[key]}")
     if ("mask" in fields) == ("calibration" in fields):
         raise FileError(f"{where}: expected either a [mask] or a [calibration]")
     return fields

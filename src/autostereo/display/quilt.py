@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..checks import ASPECT_RANGE, check_number
 from ..errors import InputError
-from .masks import check_number, check_size
+from .masks import check_size
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class Quilt:
     def __post_init__(self) -> None:
         for name in ("columns", "rows", "width", "height"):
             object.__setattr__(self, name, check_size(f"quilt {name}", getattr(self, name)))
-        object.__setattr__(self, "aspect", check_number("quilt aspect", self.aspect, 0.0, 1e6))
+        object.__setattr__(self, "aspect", check_number("quilt aspect", self.aspect, *ASPECT_RANGE))
         if self.columns > self.width or self.rows > self.height:
             raise InputError(f"quilt: {self.columns}×{self.rows} tiles do not fit {self.width}×{self.height} pixels")
 

@@ -12,39 +12,29 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import (
+    ASPECT_RANGE,
+    FARTHEST,
+    FOV_RANGE,
+    SMALLEST,
+    Vector,
+    check_direction,
+    check_number,
+    check_reach,
+    check_vector,
+    check_views,
+    real_array,
+)
 from ..errors import FileError, InputError
-from ..image import write_atomic
+from ..image import as_path, write_atomic
 from ..transforms import eye_from_world
 from ..viewmap import offset_at
 
 if TYPE_CHECKING:
     from .display import Display
 
-Vector = tuple[float, float, float]
+LENGTHS = {"focal_distance": SMALLEST, "near": SMALLEST, "baseline": 0.0, "offset_y": -FARTHEST}  # from … to FARTHEST
 SPACINGS = ("linear", "equal-angle", "cell-centred")
-
-
-def _number(name: str, value: object, low: float, high: float, open_low: bool = False) -> float:
-    if isinstance(value, (bool, str)) or not np.isscalar(value):
-        raise InputError(f"rig {name}: expected a number, got {value!r}")
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except OverflowError:  # a whole number of hundreds of digits
-        number = np.inf
-    if not np.isfinite(number) or not low <= number <= high or (open_low and number == low):
-        bracket = "(" if open_low else "["
-        raise InputError(f"rig {name}: expected a number in {bracket}{low:g}, {high:g}], got {value!r}")
-    return number
-
-
-def _vector(name: str, value: object) -> Vector:
-    try:
-        v = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"rig {name}: expected three numbers, got {value!r}") from None
-    if v.shape != (3,) or not np.isfinite(v).all():
-        raise InputError(f"rig {name}: expected three finite numbers, got {value!r}")
-    return (float(v[0]), float(v[1]), float(v[2]))
 
 
 @dataclass(frozen=True)
@@ -54,22 +44,23 @@ class Rig:
     Parameters
     ----------
     position, target, up : (3,) float
-        Centre of the line of cameras, a point straight ahead, and the upward direction, in world units.
+        Centre of the line of cameras, a point straight ahead, and the upward direction, in world units. Lengths and
+        places lie within ±1e15.
     fov_y : float
-        Vertical field of view in degrees of the focal-plane window.
+        Vertical field of view in degrees of the focal-plane window, 0.001…179.
     focal_distance : float, optional
         Distance of the plane without parallax; None: |target − position|.
     baseline : float
         Distance between the outermost cameras, world units.
     views : int
-        V; with V = 1 the camera stands at offset 0.
+        V, 1…4096; with V = 1 the camera stands at offset 0.
     spacing : {"linear", "equal-angle", "cell-centred"}
         Equal steps; equal angles seen from the focal point, ends included; equal angles, centres of V equal cells
         (displays.md 3.4). With "cell-centred" the baseline spans the cells' outer edges.
     offsets : sequence of V floats, optional
         Explicit camera offsets, ascending, instead of baseline and spacing.
     aspect : float, optional
-        Width/height of the window; None: that of the picture.
+        Width/height of the window, 1e-6…1e6; None: that of the picture.
     near : float, optional
         Depth of the near plane; None: 0.01·focal_distance. There is no far plane.
     offset_y : float
@@ -91,30 +82,28 @@ class Rig:
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        for name in ("position", "target", "up"):
-            put(self, name, _vector(name, getattr(self, name)))
+        for name in ("position", "target"):
+            put(self, name, check_vector(f"rig {name}", getattr(self, name), FARTHEST))
+        put(self, "up", check_direction("rig up", self.up))
         _ = self.eye_from_world  # raises if degenerate
-        put(self, "fov_y", _number("fov_y", self.fov_y, 0.0, 179.0, open_low=True))
-        put(self, "baseline", _number("baseline", self.baseline, 0.0, 1e30))
-        put(self, "offset_y", _number("offset_y", self.offset_y, -1e30, 1e30))
-        for name in ("focal_distance", "aspect", "near"):
+        put(self, "fov_y", check_number("rig fov_y", self.fov_y, *FOV_RANGE))
+        for name, low in LENGTHS.items():
             if getattr(self, name) is not None:
-                put(self, name, _number(name, getattr(self, name), 0.0, 1e30, open_low=True))
-        if isinstance(self.views, bool) or not isinstance(self.views, (int, np.integer)) or self.views < 1:
-            raise InputError(f"rig views: expected a whole number ≥ 1, got {self.views!r}")
+                put(self, name, check_number(f"rig {name}", getattr(self, name), low, FARTHEST))
+        if self.aspect is not None:
+            put(self, "aspect", check_number("rig aspect", self.aspect, *ASPECT_RANGE))
+        put(self, "views", check_views(self.views, "rig views"))
         if self.spacing not in SPACINGS:
             raise InputError(f"rig spacing: expected one of {', '.join(SPACINGS)}, got {self.spacing!r}")
         if self.offsets is not None:
             self._check_offsets()
-        put(self, "views", int(self.views))
 
     def _check_offsets(self) -> None:
-        try:
-            given = np.asarray(self.offsets, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):
-            raise InputError(f"rig offsets: expected numbers, got {self.offsets!r}") from None
+        given = real_array("rig offsets", self.offsets, "numbers").astype(np.float64)
         if given.ndim != 1 or given.size == 0 or not np.isfinite(given).all() or (np.diff(given) <= 0).any():
             raise InputError("rig offsets: expected finite numbers, strictly ascending (view 0 is the leftmost)")
+        check_reach("rig offsets", given, FARTHEST)
+        check_views(given.size, "rig views")
         if self.views not in (given.size, Rig.views):
             raise InputError(f"rig offsets: expected {self.views} numbers (views), got {given.size}")
         object.__setattr__(self, "offsets", tuple(float(o) for o in given))
@@ -187,7 +176,7 @@ class Rig:
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Rig:
         """Read a JSON file of rig fields; unknown fields are errors."""
-        path = Path(path)
+        path = as_path(path)
         try:
             fields: Any = json.loads(path.read_text(encoding="utf-8"))
         except OSError as error:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..frame import Panel, ViewStack
-from ..image import IMAGE_SUFFIXES, write_image
+from ..image import IMAGE_SUFFIXES, as_path, write_image
 from .quilt import pack_quilt, parse_quilt_name
 from .video import ANIMATION_SUFFIXES, save_animation
 
@@ -35,7 +35,7 @@ def save(picture: Panel | ViewStack, path: str | os.PathLike[str], fps: float | 
     FileError
         The file cannot be written; nothing is left behind.
     """
-    path = Path(path)
+    path = as_path(path)
     suffix = path.suffix.lower()
     if isinstance(picture, Panel):
         return picture.save(path)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..display.quilt import Quilt
 from ..errors import InputError
 from ..frame import ViewStack
-from ..image import write_image
+from ..image import as_path, write_image
 
 MAX_TILES = 32  # tiles a side, and pixels a side, that Looking Glass software takes
 MAX_PIXELS = 16384
@@ -47,7 +47,7 @@ def quilt_path(path: str | os.PathLike[str], layout: Quilt) -> Path:
 
     bunny.webp becomes bunny_qs8x6a0.75.webp.
     """
-    path = Path(path)
+    path = as_path(path)
     match = _NAME.search(path.name)
     suffix = match[4] or ".png" if match else path.suffix or ".png"
     stem = path.name[: match.start()] if match else path.stem
@@ -62,7 +62,7 @@ def parse_quilt_name(path: str | os.PathLike[str]) -> QuiltName | None:
     InputError
         The name has that form, but no or too many tiles, or the aspect 0.
     """
-    match = _NAME.search(Path(path).name)
+    match = _NAME.search(as_path(path).name)
     if match is None:
         return None
     columns, rows, aspect = int(match[1]), int(match[2]), float(match[3])

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..display.layouts import STEREO, Packing
 from ..errors import InputError
 
 Pixels = NDArray[np.uint8]
@@ -53,13 +54,6 @@ def _anaglyph(views: Pixels) -> Pixels:
     return out
 
 
-def _packed_frame(gap: int) -> Callable[[Pixels], Pixels]:
-    def arrange(views: Pixels) -> Pixels:
-        return np.concatenate([views[0], np.zeros((gap, *views.shape[2:]), np.uint8), views[1]])
-
-    return arrange
-
-
 def _two_by_two(views: Pixels) -> Pixels:
     return np.concatenate([_beside(views[:2]), _beside(views[2:])])
 
@@ -89,6 +83,13 @@ class Layout:
     size: tuple[int, int] | None = None
 
 
+def _packed_frame(about: str, packing: Packing) -> Layout:
+    def arrange(views: Pixels) -> Pixels:
+        return np.concatenate([views[0], np.zeros((packing.gap, *views.shape[2:]), np.uint8), views[1]])
+
+    return Layout(about, arrange, size=packing.size)
+
+
 LAYOUTS: dict[str, Layout] = {
     "side-by-side": Layout("left | right, each at full width", _beside),
     "side-by-side-half": Layout("left | right, each at half width", _beside, halves=2),
@@ -98,8 +99,8 @@ LAYOUTS: dict[str, Layout] = {
     "column-interleaved": Layout("even columns left, odd columns right", _columns),
     "checkerboard": Layout("pixels of even x + y left, of odd x + y right", _checkerboard),
     "anaglyph": Layout("red/cyan glasses, Dubois", _anaglyph),
-    "frame-packing-720p": Layout("HDMI 1280×1470: left, 30 black lines, right", _packed_frame(30), size=(1280, 720)),
-    "frame-packing-1080p": Layout("HDMI 1920×2205: left, 45 black lines, right", _packed_frame(45), size=(1920, 1080)),
+    "frame-packing-720p": _packed_frame("HDMI 1280×1470: left, 30 black lines, right", STEREO["frame-packing-720p"]),
+    "frame-packing-1080p": _packed_frame("HDMI 1920×2205: left, 45 black lines, right", STEREO["frame-packing-1080p"]),
     "leia-2x2": Layout("four views, 0 1 above 2 3 (name files *_2x2)", _two_by_two, views=4),
 }
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import DependencyError, FileError, InputError, UnsupportedError
 from ..frame import ViewStack
-from ..image import write_atomic
+from ..image import as_path, write_atomic
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -52,7 +52,7 @@ def save_animation(path: str | os.PathLike[str], views: ViewStack, fps: float | 
     DependencyError
         MP4 needs PyAV, `pip install autostereo[video]`.
     """
-    path = Path(path)
+    path = as_path(path)
     suffix = path.suffix.lower()
     if suffix not in ANIMATION_SUFFIXES:
         raise InputError(f"{path}: expected an animation ({' '.join(ANIMATION_SUFFIXES)}), got {path.suffix!r}")

@@ -6,7 +6,7 @@ LEVELS = 255.0  # a colour's uint8 is ⌊255·v + ½⌋
 TINY = 1e-30  # stands in for a squared length of 0 under a root or a quotient: a zero vector stays zero
 MAX_CELLS = 4  # cells of sub-pixels that differ in phase: no pattern of displays.md 3.3 has more
 ATLAS_VIEWS = 512  # views of one atlas: their offsets and tiles have to fit into a uniform block of 16 KB
-MAX_CAMERAS = 4096  # views of a panel, cameras.MAX_VIEWS: their offsets fill a uniform block of 16 KB
+MAX_CAMERAS = 4096  # views of a panel, checks.MAX_VIEWS: their offsets fill a uniform block of 16 KB
 MEMORY_WIDTH = 4096  # columns of pictures that hold arrays (gl/memory.py)
 
 # Volumes on the gl engine (gl/volume*.py)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..checks import FARTHEST, check_number
 from ..errors import InputError
 
 CHOICES: dict[str, tuple[object, ...]] = {
@@ -84,9 +85,7 @@ class Options:
                 raise InputError(f"options {name}: expected one of {wanted}, got {value!r}")
         if isinstance(self.step, bool) or not isinstance(self.step, (int, float)) or not 0 < self.step < 1e6:
             raise InputError(f"options step: expected a number > 0, got {self.step!r}")
-        aperture = self.aperture
-        if isinstance(aperture, bool) or not isinstance(aperture, (int, float)) or not 0 <= aperture < 1e30:
-            raise InputError(f"options aperture: expected a number ≥ 0, got {aperture!r}")
+        check_number("options aperture", self.aperture, 0.0, FARTHEST)
         lens = self.lens
         whole = isinstance(lens, tuple) and len(lens) == 2 and all(type(n) is int and 1 <= n <= 64 for n in lens)
         if not whole:
@@ -94,7 +93,7 @@ class Options:
         small = self.small_size
         if small is not None and not (isinstance(small, tuple) and len(small) == 2 and all(map(is_count, small))):
             raise InputError(f"options small_size: expected two whole numbers ≥ 1, got {small!r}")
-        if aperture and self.depth:
+        if self.aperture and self.depth:
             raise InputError("options depth: means through a lens of some aperture have no one depth")
         for name in ("views_per_pass", "groups", "references"):
             value = getattr(self, name)

@@ -17,6 +17,7 @@ from ..errors import AutostereoError, FileError
 from ..scene.appearance import Material
 from ..scene.mesh import Mesh
 from .files import PathLike, read_bytes
+from .gltf_types import check_types
 from .image import decode_image, read_image
 from .mesh import check_indices, usable_normals
 
@@ -53,8 +54,10 @@ def load_gltf(path: PathLike) -> list[Mesh]:
         meshes = [mesh for node, world in file.placed() for mesh in file.mesh(node["mesh"], world)]
     except AutostereoError:
         raise
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
-        raise FileError(f"{path}: is not valid glTF ({type(error).__name__}: {error})") from error
+    except KeyError as error:
+        raise FileError(f"{path}: is not valid glTF, an entry lacks its {error.args[0]!r}") from error
+    except (IndexError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
+        raise FileError(f"{path}: is not valid glTF, an entry is of another type or size than expected") from error
     if not meshes:
         raise FileError(f"{path}: has no triangles in its scene")
     return meshes
@@ -80,7 +83,8 @@ class _File:
             raise FileError(f"{path}: is not glTF: its JSON cannot be parsed ({error})") from None
         if not isinstance(self.tree, dict) or "asset" not in self.tree:
             raise FileError(f"{path}: is not glTF: its JSON has no 'asset'")
-        version = str(self.tree["asset"].get("version"))
+        check_types(self.tree, path)
+        version = self.tree["asset"].get("version", "of no version")
         if version.split(".")[0] != "2":
             raise FileError(f"{path}: is glTF {version}, expected 2.0")
         for name in self.tree.get("extensionsRequired", []):
@@ -111,8 +115,8 @@ class _File:
     def item(self, kind: str, index: Any) -> dict[str, Any]:
         """Entry `index` of the top-level list `kind`; unlike Python, no negative index."""
         entries = self.tree.get(kind, [])
-        if not isinstance(index, int) or not 0 <= index < len(entries):
-            raise FileError(f"{self.path}: refers to {kind}[{index}], the file has {len(entries)}")
+        if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(entries):
+            raise FileError(f"{self.path}: refers to {kind}[{json.dumps(index)}], the file has {len(entries)}")
         return entries[index]
 
     # --- bytes ---------------------------------------------------------------------------------
@@ -161,11 +165,18 @@ class _File:
             raise FileError(f"{self.path}: truncated: {shape[0]} numbers do not fit into bufferView {view}")
         return np.ndarray(shape, dtype, data, offset, (stride, dtype.itemsize)).copy()
 
+    def _kind(self, entry: dict[str, Any]) -> str:
+        """NumPy's type of an entry's numbers."""
+        if entry["componentType"] not in _COMPONENTS:
+            wanted = ", ".join(map(str, _COMPONENTS))
+            raise FileError(f"{self.path}: expected a componentType of {wanted}, found {entry['componentType']}")
+        return _COMPONENTS[entry["componentType"]]
+
     def accessor(self, index: int, columns: tuple[int, ...] = (1,)) -> NDArray:
         """Numbers (count, columns) of an accessor; normalised integers become 0…1 or −1…1."""
         entry = self.item("accessors", index)
-        kind, width, count = _COMPONENTS[entry["componentType"]], _COLUMNS[entry["type"]], entry["count"]
-        if width not in columns or not isinstance(count, int) or count < 0:
+        kind, width, count = self._kind(entry), _COLUMNS.get(entry["type"]), entry["count"]
+        if width is None or width not in columns or count < 0:
             raise FileError(f"{self.path}: accessor {index} has {count} of {entry['type']}, which is not expected")
         if "bufferView" in entry:
             table = self._table(entry["bufferView"], entry.get("byteOffset", 0), kind, (count, width))
@@ -175,7 +186,7 @@ class _File:
             raise FileError(f"{self.path}: accessor {index} of {count} has no data")
         if sparse := entry.get("sparse"):
             n, where, what = sparse["count"], sparse["indices"], sparse["values"]
-            index_kind = _COMPONENTS[where["componentType"]]
+            index_kind = self._kind(where)
             rows = self._table(where["bufferView"], where.get("byteOffset", 0), index_kind, (n, 1))
             check_indices(rows, count, self.path)
             table[rows[:, 0]] = self._table(what["bufferView"], what.get("byteOffset", 0), kind, (n, width))

@@ -15,6 +15,7 @@ from ..errors import FileError
 from .files import PathLike, read_bytes
 
 MAX_PIXELS = 2**29  # twice the largest quilt, 16384²: 1.6 GB as RGB
+TIFF, TIFF_BITS = (b"II*\0", b"MM\0*"), "8 or 16 bits a colour (floats are not read)"
 _PILLOW_LIMIT = threading.Lock()
 
 
@@ -33,7 +34,7 @@ def read_image(path: PathLike, asked_by: PathLike | None = None) -> NDArray[np.u
 
 def decode_image(data: bytes, name: str) -> NDArray[np.uint8]:
     """Decode the bytes of a picture file, as `read_image`; `name` is what an error calls it."""
-    return decode(data, name, lambda image, _: _as_rgb(image))
+    return decode(data, name, _as_rgb)
 
 
 def decode(data: bytes, name: str, pixels: Callable[[Any, str], NDArray[Any]]) -> NDArray[Any]:
@@ -44,6 +45,8 @@ def decode(data: bytes, name: str, pixels: Callable[[Any, str], NDArray[Any]]) -
         try:
             image = Image.open(io.BytesIO(data))
         except Exception as error:
+            if data[:4] in TIFF:
+                raise FileError(f"{name}: is damaged, or is no TIFF of {TIFF_BITS}") from error
             raise FileError(f"{name}: is not a picture that can be read (PNG, JPEG, WebP, TIFF, BMP, …)") from error
         width, height = image.size
         if width * height > MAX_PIXELS:
@@ -71,13 +74,14 @@ def _without_pillow_limit() -> Iterator[None]:
             Image.MAX_IMAGE_PIXELS = limit
 
 
-def _as_rgb(image: Any) -> NDArray[np.uint8]:
+def _as_rgb(image: Any, name: str) -> NDArray[np.uint8]:
     """Pixels of a PIL image as (H, W, 3|4) uint8."""
     if image.mode.startswith("I;16"):
         grey = np.asarray(image).astype(np.uint16)
         return np.repeat(((grey.astype(np.uint32) + 128) // 257).astype(np.uint8)[..., None], 3, axis=2)
     if image.mode in ("I", "F"):
-        raise ValueError(f"pixels of type {image.mode} have no fixed range")
+        found = "floats" if image.mode == "F" else "integers of 32 bits"
+        raise FileError(f"{name}: holds {found}, which have no fixed range as colours; expected {TIFF_BITS}")
     see_through = image.mode in ("RGBA", "LA", "PA", "RGBa", "La") or "transparency" in image.info
     mode = "RGBA" if see_through else "RGB"
     width, height = image.size

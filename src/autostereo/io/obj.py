@@ -67,7 +67,8 @@ def load_obj(path: PathLike) -> list[Mesh] | list[Points]:
     Raises
     ------
     FileError
-        The file is not OBJ, its faces have no triangles, it names vertices it does not have, or a texture is missing.
+        The file is not OBJ, its faces have no triangles, it names vertices it does not have, a texture is missing, or
+        a material library is something else.
 
     Warns
     -----
@@ -245,7 +246,7 @@ def _parts(text: _Text, n_faces: int) -> tuple[list[bytes], NDArray[np.int64]]:
 def _libraries(text: _Text, path: PathLike) -> dict[bytes, _Surface]:
     """All materials of the libraries that the file names."""
     surfaces: dict[bytes, _Surface] = {}
-    folder = Path(path).parent
+    folder, libraries = Path(path).parent, 0
     for line in text.libraries:
         # one name that may hold blanks, or several names
         names = [line] if (folder / line.decode("utf-8", "replace")).is_file() else line.split()
@@ -253,10 +254,11 @@ def _libraries(text: _Text, path: PathLike) -> dict[bytes, _Surface]:
             library = folder / name.decode("utf-8", "replace").replace("\\", "/")
             if library.exists():
                 surfaces.update(_read_mtl(library))
+                libraries += 1
             elif text.used:
                 warnings.warn(f"{path}: the material library {library} does not exist", stacklevel=3)
     missing = sorted({name for _, name in text.used if name and name not in surfaces})
-    if surfaces and missing:
+    if libraries and missing:
         listed = ", ".join(name.decode("utf-8", "replace") for name in missing[:5])
         warnings.warn(f"{path}: no library defines the materials {listed}", stacklevel=3)
     return surfaces
@@ -265,11 +267,12 @@ def _libraries(text: _Text, path: PathLike) -> dict[bytes, _Surface]:
 def _read_mtl(path: Path) -> dict[bytes, _Surface]:
     """Materials of one MTL file by name."""
     surfaces: dict[bytes, _Surface] = {}
-    surface = _Surface()
+    surface, content = _Surface(), False
     for line in read_bytes(path).splitlines():
         word, _, rest = line.strip().replace(b"\t", b" ").partition(b" ")
         words = rest.split()
         key = word.lower()
+        content = content or (key != b"" and not key.startswith(b"#"))
         if key == b"newmtl":
             surface = surfaces.setdefault(rest.strip(), _Surface())
         elif key == b"kd" and words and words[0] not in (b"spectral", b"xyz"):
@@ -282,6 +285,8 @@ def _read_mtl(path: Path) -> dict[bytes, _Surface]:
             surface.illum = int(whole_numbers(words[:1], path, "illum")[0])
         elif key == b"map_kd" and words:
             surface.texture = path.parent / _map_name(rest.strip()).decode("utf-8", "replace").replace("\\", "/")
+    if not surfaces and content:
+        raise FileError(f"{path}: is not a library of materials (MTL), no line begins with newmtl")
     for surface in surfaces.values():
         if surface.texture is not None and not surface.kd.any():
             surface.kd = np.ones(3)  # exporters write Kd 0 beside a texture and do not mean black

@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import Vector, check_vector
 from ..errors import DependencyError, FileError, InputError
-from ..scene.appearance import Vector, check_vector
 from ..scene.volume import Volume
 from .files import PathLike, check_start, read_bytes
 from .metaimage import checked_metaimage

@@ -20,10 +20,21 @@ METHODS: dict[str, ModuleType] = {
 }
 
 
+GL = "gl"
+
+
 def get_method(name: str, engine: Engine) -> ModuleType:
     """Return the schedule called `name`, which has draw_views and draw_panel, if `engine` can draw it."""
     if name in getattr(engine, "own_methods", ()):
         return single_pass
     if not isinstance(name, str) or name not in METHODS or name not in engine.methods:
-        raise UnsupportedError(f"method {name!r}: the {engine.name} engine has {', '.join(engine.methods)}")
+        hint = f"; engine {GL} has it (--engine {GL})" if engine.name != GL and name in _methods_of_gl() else ""
+        raise UnsupportedError(f"method {name!r}: the {engine.name} engine has {', '.join(engine.methods)}{hint}")
     return METHODS[name]
+
+
+def _methods_of_gl() -> list[object]:
+    """Names of its methods, without starting it."""
+    from ..engines.gl.engine import METHODS as BY_KIND
+
+    return [name for names in BY_KIND.values() for name in names]

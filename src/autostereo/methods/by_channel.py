@@ -27,10 +27,11 @@ def by_channel(draw_panel: DrawPanel) -> DrawPanel:
         if draw.options.sampling == "pixel":
             draw_panel(engine, prepared, draw, target)
             return
+        pixels = np.empty_like(target.color)
         for c in range(3):
-            one = Target(np.empty_like(target.color))
+            one = Target(pixels)
             draw_panel(engine, prepared, of_channel(draw, c), one)
-            target.color[..., c] = one.color[..., c]
+            target.color[..., c] = pixels[..., c]
             target.covered, target.reused = target.covered + one.covered, target.reused + one.reused
 
     return draw

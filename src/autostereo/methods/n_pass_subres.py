@@ -29,7 +29,8 @@ def beside(engine: Engine, prepared: Any, draw: Draw) -> int:
 
 def draw_views(engine: Engine, prepared: Any, draw: Draw, target: Target) -> None:
     """There is no resolution to save in a stack of views."""
-    raise UnsupportedError("method 'n-pass-subres': for panels only; a stack of views has n-pass and single-pass")
+    others = ", ".join(name for name in engine.methods if name != draw.method)
+    raise UnsupportedError(f"method {draw.method!r}: for panels only; for views the {engine.name} engine has {others}")
 
 
 @by_channel

@@ -7,33 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import FARTHEST, Vector, check_direction, check_number, check_vector, real_array
 from ..errors import InputError
 
-Vector = tuple[float, float, float]
-
-
-def check_vector(name: str, value: object) -> Vector:
-    """Return three finite numbers as a tuple, or raise an error that names the field."""
-    try:
-        v = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{name}: expected three numbers, got {value!r}") from None
-    if v.shape != (3,) or not np.isfinite(v).all():
-        raise InputError(f"{name}: expected three finite numbers, got {value!r}")
-    return (float(v[0]), float(v[1]), float(v[2]))
-
-
-def check_number(name: str, value: object, low: float = -np.inf, high: float = np.inf) -> float:
-    """Return a finite number within [low, high], or raise an error that names the field."""
-    if isinstance(value, (bool, str, bytes, complex)) or not np.isscalar(value):
-        raise InputError(f"{name}: expected a number, got {value!r}")
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except OverflowError:  # a whole number of hundreds of digits
-        number = np.inf
-    if not np.isfinite(number) or not low <= number <= high:
-        raise InputError(f"{name}: expected a finite number in [{low:g}, {high:g}], got {value!r}")
-    return number
+ROUNDING = 1e-6  # of colours that were calculated in float32
 
 
 @dataclass(frozen=True)
@@ -72,10 +49,8 @@ class DirectionalLight:
     color: Vector = (1.0, 1.0, 1.0)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "direction", check_vector("light direction", self.direction))
-        object.__setattr__(self, "color", check_vector("light color", self.color))
-        if not any(self.direction):
-            raise InputError("light direction: expected a vector of some length, got (0, 0, 0)")
+        object.__setattr__(self, "direction", check_direction("light direction", self.direction))
+        object.__setattr__(self, "color", check_vector("light color", self.color, 1e6))
 
 
 @dataclass(frozen=True)
@@ -86,30 +61,46 @@ class PointLight:
     color: Vector = (1.0, 1.0, 1.0)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position", check_vector("light position", self.position))
-        object.__setattr__(self, "color", check_vector("light color", self.color))
+        object.__setattr__(self, "position", check_vector("light position", self.position, FARTHEST))
+        object.__setattr__(self, "color", check_vector("light color", self.color, 1e6))
 
 
 Light = DirectionalLight | PointLight
 
 
+def check_color_values(name: str, array: NDArray) -> None:
+    """Raise InputError unless integers of any type lie within 0…255, and floats, but for a rounding, within 0…1."""
+    if array.size == 0 or array.dtype == np.uint8:
+        return
+    low, high = array.min(), array.max()
+    if array.dtype.kind in "iu":
+        if low < 0 or high > 255:
+            found = low if low < 0 else high
+            raise InputError(f"{name}: expected integers 0…255 (or floats 0…1), found {found} ({array.dtype})")
+    elif not (np.isfinite(low) and np.isfinite(high)):
+        raise InputError(f"{name}: expected finite numbers, found NaN or infinity")
+    elif low < -ROUNDING or high > 1 + ROUNDING:
+        found = low if low < -ROUNDING else high
+        raise InputError(f"{name}: expected floats 0…1 (or integers 0…255), found {found:.7g}")
+
+
 def check_image(name: str, image: object) -> NDArray[np.uint8]:
-    """Return an image as (H, W, 3) uint8. Grey is spread, alpha dropped, floats in 0…1 scaled."""
+    """Return an image as (H, W, 3) uint8, of values as `check_color_values` has them. Grey is spread, alpha dropped."""
     try:
-        a = np.asarray(image)
+        # PIL has palettes, grey with alpha and more, which as arrays would not be colours; 16 bits it would cut
+        palettes = hasattr(image, "convert") and str(getattr(image, "mode", ""))[:1] not in "IF"
+        image = image.convert("RGB") if palettes else image  # type: ignore[attr-defined]
     except Exception as error:  # lazy PIL images decode here
         raise InputError(f"{name}: cannot be decoded ({error})") from error
+    a = real_array(name, image, "an image")
     if a.ndim == 2:
-        a = np.repeat(a[..., None], 3, axis=2)
-    if a.ndim == 3 and a.shape[2] in (1, 2):  # grey, grey + alpha
-        a = np.repeat(a[..., :1], 3, axis=2)
-    if a.ndim != 3 or a.shape[2] not in (3, 4) or 0 in a.shape:
+        a = a[..., None]
+    if a.ndim != 3 or a.shape[2] not in (1, 3, 4) or 0 in a.shape:
         raise InputError(f"{name}: expected an image (H, W), (H, W, 3) or (H, W, 4), got {a.shape}")
-    if np.issubdtype(a.dtype, np.floating):
-        if not np.isfinite(a).all():
-            raise InputError(f"{name}: expected finite values, found NaN or infinity")
-        a = np.floor(np.clip(a, 0.0, 1.0) * 255.0 + 0.5)
-    elif a.dtype != np.uint8:
-        raise InputError(f"{name}: expected uint8 or float in 0…1, got {a.dtype}")
+    check_color_values(name, a[..., :3])
+    if a.dtype.kind not in "iu":
+        a = np.floor(np.clip(a[..., :3], 0.0, 1.0) * 255.0 + 0.5)
+    if a.shape[2] == 1:
+        a = np.repeat(a, 3, axis=2)
     # an array that fits is kept as it is, so that objects can share one texture
     return np.ascontiguousarray(a if a.shape[2] == 3 else a[..., :3], dtype=np.uint8)

@@ -8,41 +8,37 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import check_reach, real_array
 from ..errors import InputError
-from ..transforms import apply, as_transform
-from .appearance import Material, check_image
+from ..transforms import apply, as_transform, check_world
+from .appearance import Material, check_color_values, check_image
 
 
 def _floats(name: str, value: ArrayLike, columns: tuple[int, ...], count: int | None = None) -> NDArray[np.float64]:
     """Return a finite float64 array of shape (count, one of columns), or raise an error that names the field."""
-    try:
-        a = np.array(value, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: expected an array of numbers, got {type(value).__name__}") from None
+    a = np.array(real_array(name, value), dtype=np.float64, order="C")
     wanted = " or ".join(f"({'N' if count is None else count}, {c})" for c in columns)
     if a.ndim != 2 or a.shape[1] not in columns or (count is not None and a.shape[0] != count):
         raise InputError(f"{name}: expected shape {wanted}, got {a.shape}")
     bad = ~np.isfinite(a).all(axis=1)
     if bad.any():
         raise InputError(f"{name}: expected finite numbers, found NaN or infinity in {bad.sum()} of {len(a)} rows")
+    check_reach(name, a)
     return a
 
 
 def _colors(value: ArrayLike, count: int) -> NDArray[np.float32]:
     """Return colours as (N, 3) float32 in 0…1; integers count as 0…255, alpha is ignored."""
-    a = _floats("colors", value, (3, 4), count)[:, :3]
-    if np.issubdtype(np.asarray(value).dtype, np.integer):
+    given = real_array("colors", value)
+    a = _floats("colors", given, (3, 4), count)[:, :3]
+    check_color_values("colors", given[:, :3])
+    if given.dtype.kind in "iu":
         a = a / 255.0
-    if a.size and (a.min() < 0 or a.max() > 1):
-        raise InputError(f"colors: expected 0…1 (float) or 0…255 (uint8), found {a.min():g}…{a.max():g}")
-    return np.ascontiguousarray(a, dtype=np.float32)
+    return np.ascontiguousarray(np.clip(a, 0.0, 1.0), dtype=np.float32)
 
 
 def _faces(value: ArrayLike, count: int) -> NDArray[np.int32]:
-    try:
-        raw = np.asarray(value)
-    except (TypeError, ValueError):
-        raise InputError(f"faces: expected an array of integers, got {type(value).__name__} of uneven rows") from None
+    raw = real_array("faces", value, "an array of integers")
     if raw.ndim != 2 or raw.shape[1] != 3:
         raise InputError(f"faces: expected shape (F, 3), got {raw.shape}")
     if len(raw) == 0:
@@ -104,11 +100,13 @@ class Mesh:
     normals : array_like of shape (N, 3), optional
         Missing normals are angle-weighted over vertices merged by position.
     colors : array_like of shape (N, 3 or 4), optional
-        Display (sRGB) values, float 0…1 or uint8; alpha is ignored. Default white.
+        Display (sRGB) values: floats 0…1, or integers of any type 0…255, so that an integer 1 is nearly black and
+        white is 255 or 1.0; alpha is ignored. Default white.
     uv : array_like of shape (N, 2), optional
         Texture coordinates, (0, 0) the bottom left of the texture; they repeat.
     texture : image of shape (h, w, 3 or 4), optional
-        uint8 or float 0…1, or a PIL image; needs `uv`. A uint8 RGB array is not copied: objects can share it.
+        Values as of `colors`, or a PIL image; needs `uv`. Grey (h, w) is spread, alpha dropped. A uint8 RGB array is
+        not copied: objects can share it.
     material : Material, optional
     transform : array_like of shape (4, 4), optional
         world_from_object.
@@ -132,8 +130,6 @@ class Mesh:
         put = object.__setattr__
         put(self, "vertices", _floats("vertices", self.vertices, (3,)))
         count = len(self.vertices)
-        if np.abs(self.vertices).max(initial=0.0) > 1e30:
-            raise InputError("vertices: coordinates beyond ±1e30 cannot be rendered")
         put(self, "faces", _faces(self.faces, count))
         if self.normals is not None:
             put(self, "normals", _floats("normals", self.normals, (3,), count))
@@ -150,6 +146,7 @@ class Mesh:
         elif not isinstance(self.material, Material):
             raise InputError(f"material: expected a Material, got {type(self.material).__name__}")
         put(self, "transform", as_transform(self.transform))
+        check_world("vertices", self.transform, self.vertices)
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:

@@ -8,8 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import LARGEST, real_array
 from ..errors import InputError
-from ..transforms import apply, apply_normals, as_transform
+from ..transforms import apply, apply_normals, as_transform, check_world
 from .appearance import Material
 from .mesh import _colors, _floats
 from .neighbors import estimate_normals, estimate_radii
@@ -33,7 +34,7 @@ class Points:
     radii : array_like of shape (N,) or float, optional
         In object space, > 0. None: estimated from neighbours, such that evenly sampled surfaces have no holes.
     colors : array_like of shape (N, 3 or 4), optional
-        Display (sRGB) values, float 0…1 or uint8; alpha is ignored. Default light grey (0.8).
+        Display (sRGB) values: floats 0…1, or integers of any type 0…255; alpha is ignored. Default light grey (0.8).
     transform : array_like of shape (4, 4), optional
         world_from_object.
     material : Material, optional
@@ -58,8 +59,6 @@ class Points:
         count = len(self.positions)
         if count == 0:
             raise InputError("positions: expected at least one point, got none")
-        if np.abs(self.positions).max() > 1e30:
-            raise InputError("positions: coordinates beyond ±1e30 cannot be rendered")
         put(self, "radii", estimate_radii(self.positions) if self.radii is None else _radii(self.radii, count))
         if self.normals is not None:
             put(self, "normals", _unit_normals(_floats("normals", self.normals, (3,), count), self.positions))
@@ -72,6 +71,10 @@ class Points:
         elif not isinstance(self.material, Material):
             raise InputError(f"material: expected a Material, got {type(self.material).__name__}")
         put(self, "transform", as_transform(self.transform))
+        check_world("positions", self.transform, self.positions)
+        widest = self.radii.max() * np.linalg.norm(self.transform[:3, :3], 2)
+        if widest > LARGEST:
+            raise InputError(f"radii: expected radii up to {LARGEST:g} in the world, found up to {widest:g}")
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -114,10 +117,7 @@ class Points:
 
 def _radii(value: object, count: int) -> NDArray[np.float64]:
     """Return radii (count,) > 0; one number serves all."""
-    try:
-        radii = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"radii: expected numbers, got {type(value).__name__}") from None
+    radii = np.array(real_array("radii", value, "numbers"), dtype=np.float64)
     if radii.shape not in ((), (1,), (count,), (count, 1)):
         raise InputError(f"radii: expected one number or shape ({count},), got {radii.shape}")
     bad = ~(np.isfinite(radii) & (radii > 0))

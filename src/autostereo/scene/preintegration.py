@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import LARGEST, check_number
 from ..errors import InputError
-from .appearance import check_number
 
 if TYPE_CHECKING:
     from .transfer import TransferFunction
@@ -28,8 +28,8 @@ def preintegrate(
     transfer: TransferFunction, low: float, high: float, size: int, length: float
 ) -> NDArray[np.float32]:
     """Return the table that `TransferFunction.table` describes."""
-    low, high = check_number("table low", low), check_number("table high", high)
-    length = check_number("table length", length, 0.0)
+    low, high = check_number("table low", low, -LARGEST, LARGEST), check_number("table high", high, -LARGEST, LARGEST)
+    length = check_number("table length", length, 0.0, LARGEST)
     if isinstance(size, bool) or not isinstance(size, (int, np.integer)) or not 2 <= size <= 4096:
         raise InputError(f"table size: expected a whole number 2…4096, got {size!r}")
     if high < low:

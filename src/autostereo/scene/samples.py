@@ -11,7 +11,8 @@ from math import factorial
 import numpy as np
 from numpy.typing import NDArray
 
-from .appearance import Material, check_number
+from ..checks import check_number
+from .appearance import Material
 from .points import Points
 from .shapes import _count, hills, icosphere
 from .transfer import TransferFunction

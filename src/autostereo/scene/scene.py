@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import Vector, check_vector
 from ..errors import InputError
-from .appearance import DirectionalLight, Light, PointLight, Vector, check_vector
+from .appearance import DirectionalLight, Light, PointLight
 from .mesh import Mesh
 from .points import Points
 from .volume import Volume

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import Vector, check_number
 from ..errors import InputError
 from ..transforms import rotation, scaling, translation
-from .appearance import DirectionalLight, Material, PointLight, Vector, check_number
+from .appearance import DirectionalLight, Material, PointLight
 from .mesh import Mesh
 from .scene import Scene
 

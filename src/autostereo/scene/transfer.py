@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import LARGEST, check_number, check_reach, real_array
 from ..errors import FileError, InputError
-from ..image import write_atomic
-from .appearance import check_number
+from ..image import as_path, write_atomic
 
 if TYPE_CHECKING:
     from .volume import Volume
@@ -28,16 +28,13 @@ FAINT = 1e-280  # optical depths below this lose digits to underflow, and colour
 
 def _check_points(points: ArrayLike) -> Array:
     """Return control points as a checked (K, 5) float64 array, or raise an error that names what is wrong."""
-    try:
-        p = np.array(points, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError("transfer points: expected rows of five numbers (value, r, g, b, opacity)") from None
+    rows = "rows of five numbers (value, r, g, b, opacity)"
+    p = np.array(real_array("transfer points", points, rows), dtype=np.float64)
     if p.ndim != 2 or p.shape[1] != 5 or len(p) == 0:
         raise InputError(f"transfer points: expected rows (value, r, g, b, opacity), got shape {p.shape}")
     if not np.isfinite(p).all():
         raise InputError("transfer points: expected finite numbers, found NaN or infinity")
-    if np.abs(p[:, 0]).max() > 1e30 or p[:, 4].max() > 1e30:
-        raise InputError("transfer points: values and opacities beyond ±1e30 cannot be used")
+    check_reach("transfer points", p)
     if (np.diff(p[:, 0]) < 0).any():
         k = int(np.argmax(np.diff(p[:, 0]) < 0))
         raise InputError(f"transfer points: expected ascending values, found {p[k, 0]:g} before {p[k + 1, 0]:g}")
@@ -90,7 +87,7 @@ class TransferFunction:
 
     def scaled(self, factor: float) -> TransferFunction:
         """Return the same function with all opacities times `factor` ≥ 0."""
-        return TransferFunction(self.points * (1, 1, 1, 1, check_number("transfer factor", factor, 0.0)))
+        return TransferFunction(self.points * (1, 1, 1, 1, check_number("transfer factor", factor, 0.0, LARGEST)))
 
     # --- values ----------------------------------------------------------------------------------------------------
     def evaluate(self, s: ArrayLike) -> Array:
@@ -264,7 +261,7 @@ class TransferFunction:
             values = volume.values
             diagonal = volume.diagonal if diagonal is None else diagonal
         else:
-            values = np.asarray(volume)
+            values = real_array("values", volume)
         return TransferFunction(suggest_points(values, diagonal))
 
     # --- files -----------------------------------------------------------------------------------------------------
@@ -283,7 +280,7 @@ class TransferFunction:
         FileError
             The file is missing or not a transfer function; the message names it.
         """
-        path = Path(path)
+        path = as_path(path)
         try:
             data = json.loads(path.read_text(encoding="utf-8"))
         except FileNotFoundError:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import LARGEST, check_number
 from ..errors import DependencyError, InputError
-from .appearance import check_number
 
 CT = (-1000.0, 2000.0)  # Hounsfield units: air −1000, water 0, soft tissue 20…80, bone from about 200
 UNIT = (0.0, 1.0)
@@ -176,7 +176,8 @@ CORNERS = {
 
 
 def _check_range(low: object, high: object) -> tuple[float, float]:
-    low, high = check_number("transfer low", low, -1e30, 1e30), check_number("transfer high", high, -1e30, 1e30)
+    low = check_number("transfer low", low, -LARGEST, LARGEST)
+    high = check_number("transfer high", high, -LARGEST, LARGEST)
     if not low < high:
         raise InputError(f"transfer: expected low < high, got {low:g} and {high:g}")
     return low, high
@@ -190,7 +191,7 @@ def make_preset(name: str, low: float | None, high: float | None, scale: float) 
     low, high = _check_range(first if low is None else low, last if high is None else high)
     points = np.array(rows, dtype=np.float64)
     points[:, 0] = low + (points[:, 0] - first) / (last - first) * (high - low)
-    points[:, 4] *= check_number("transfer scale", scale, 0.0)
+    points[:, 4] *= check_number("transfer scale", scale, 0.0, LARGEST)
     return points
 
 
@@ -199,9 +200,9 @@ def make_colormap(name: str, low: float, high: float, opacity: float | Sequence[
     low, high = _check_range(low, high)
     place, color = _stops(name)
     if np.ndim(opacity) == 0:
-        given = np.array([0.0, check_number("transfer opacity", opacity, 0.0)])
+        given = np.array([0.0, check_number("transfer opacity", opacity, 0.0, LARGEST)])
     else:
-        given = np.array([check_number("transfer opacity", x, 0.0) for x in opacity])  # type: ignore[union-attr]
+        given = np.array([check_number("transfer opacity", x, 0.0, LARGEST) for x in opacity])  # type: ignore[union-attr]
         if len(given) == 0:
             raise InputError("transfer opacity: expected a number or some numbers, got none")
         given = np.repeat(given, 2) if len(given) == 1 else given

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import check_number
 from ..errors import InputError
-from .appearance import check_number
 
 SIDE = 96  # voxels along an axis that are looked at
 OPACITY = 0.75  # mean over the axis-parallel rays that meet something

@@ -8,23 +8,20 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import FARTHEST, LARGEST, SMALLEST, Vector, check_number, check_reach, check_vector, real_array
 from ..errors import InputError
 from ..transforms import apply, as_transform
-from .appearance import Material, Vector, check_number, check_vector
+from .appearance import Material
 from .transfer import TransferFunction
 
 TYPES = ("uint8", "int8", "uint16", "int16", "float32", "float64")
 MODES = ("composite", "mip", "iso")
 GRADIENTS = ("central", "sobel")
-SMALLEST, LARGEST = 1e-30, 1e15  # of voxels, of coordinates (as Rig.frame takes them)
 
 
 def _check_values(values: object) -> NDArray:
     """Return `values` as a C-contiguous (nz, ny, nx) array of one of TYPES, finite; not copied if it is one."""
-    try:
-        a = np.asarray(values)
-    except (TypeError, ValueError):
-        raise InputError(f"values: expected an array of numbers, got {type(values).__name__} of uneven rows") from None
+    a = real_array("values", values)
     if a.ndim == 4:
         raise InputError(f"values: expected three axes (z, y, x), got four, {a.shape}: choose one of its frames")
     if a.ndim != 3:
@@ -55,6 +52,8 @@ def _range(values: NDArray) -> tuple[float, float]:
     if not (np.isfinite(low) and np.isfinite(high)):
         bad = sum(int(np.count_nonzero(~np.isfinite(part))) for part in values)
         raise InputError(f"values: expected finite numbers, found NaN or infinity in {bad:,} of {values.size:,} voxels")
+    if max(-low, high) > LARGEST:
+        raise InputError(f"values: expected numbers within ±{LARGEST:g}, found {low:g}…{high:g}")
     return low, high
 
 
@@ -132,9 +131,9 @@ class Volume:
         put(self, "transform", as_transform(self.transform))
         if not abs(np.linalg.det(self.transform[:3, :3])) > 0:
             raise InputError("transform: a volume cannot be flattened, the matrix is singular")
-        if not (self.voxel_size.min() >= SMALLEST and np.abs(self.corners).max() <= LARGEST):
+        if not (self.voxel_size.min() >= SMALLEST and np.abs(self.corners).max() <= FARTHEST):
             sizes = " × ".join(f"{x:g}" for x in self.voxel_size)
-            raise InputError(f"spacing: expected voxels of {SMALLEST:g} and more within ±{LARGEST:g}, got {sizes}")
+            raise InputError(f"spacing: expected voxels of {SMALLEST:g} and more within ±{FARTHEST:g}, got {sizes}")
         for name, choices in (("mode", MODES), ("gradient", GRADIENTS)):
             if getattr(self, name) not in choices:
                 raise InputError(f"{name}: expected one of {', '.join(choices)}, got {getattr(self, name)!r}")
@@ -148,7 +147,7 @@ class Volume:
         put(self, "clip_box", _check_box(self.clip_box))
         put(self, "clip_plane", _check_plane(self.clip_plane))
         if self.iso is not None:
-            put(self, "iso", check_number("iso", self.iso))
+            put(self, "iso", check_number("iso", self.iso, -LARGEST, LARGEST))
         elif self.mode == "iso":
             put(self, "iso", self.otsu())
         if self.transfer is None:
@@ -243,12 +242,10 @@ class Volume:
 def _check_direction(direction: object) -> NDArray[np.float64]:
     if direction is None:
         return np.eye(3)
-    try:
-        d = np.array(direction, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"direction: expected a 3×3 matrix of numbers, got {type(direction).__name__}") from None
+    d = np.array(real_array("direction", direction, "a 3×3 matrix of numbers"), dtype=np.float64)
     if d.shape != (3, 3) or not np.isfinite(d).all():
         raise InputError(f"direction: expected a 3×3 matrix of finite numbers, got shape {d.shape}")
+    check_reach("direction", d)
     length = np.linalg.norm(d, axis=0)
     if np.abs(length - 1).max() > 1e-3:
         found = ", ".join(f"{x:g}" for x in length)
@@ -261,12 +258,10 @@ def _check_direction(direction: object) -> NDArray[np.float64]:
 def _check_box(box: object) -> NDArray[np.float64] | None:
     if box is None:
         return None
-    try:
-        b = np.array(box, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError("clip_box: expected two corners of three numbers") from None
+    b = np.array(real_array("clip_box", box, "two corners of three numbers"), dtype=np.float64)
     if b.shape != (2, 3) or np.isnan(b).any():
         raise InputError(f"clip_box: expected two corners of three numbers, got shape {b.shape}")
+    check_reach("clip_box", b[np.isfinite(b)])
     if (b[0] >= b[1]).any():
         raise InputError(f"clip_box: expected a lower and an upper corner, got {b[0].tolist()} and {b[1].tolist()}")
     return b
@@ -275,12 +270,10 @@ def _check_box(box: object) -> NDArray[np.float64] | None:
 def _check_plane(plane: object) -> NDArray[np.float64] | None:
     if plane is None:
         return None
-    try:
-        p = np.array(plane, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError("clip_plane: expected four numbers (a, b, c, d)") from None
+    p = np.array(real_array("clip_plane", plane, "four numbers (a, b, c, d)"), dtype=np.float64)
     if p.shape != (4,) or not np.isfinite(p).all():
         raise InputError(f"clip_plane: expected four finite numbers (a, b, c, d), got {plane!r}")
+    check_reach("clip_plane", p)
     if not p[:3].any():
         raise InputError("clip_plane: expected a normal (a, b, c) of some length, got (0, 0, 0)")
     return p

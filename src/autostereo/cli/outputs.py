@@ -1,0 +1,79 @@
+"""Where the verbs write: checks before the long work, and folders that appear whole."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..errors import FileError, InputError
+
+
+def check_output(path: Path, suffixes: tuple[str, ...] = ()) -> Path:
+    """Refuse, before the long work, a path that could not be written after it.
+
+    With `suffixes` it is to be a file, without them a folder.
+    """
+    if suffixes and path.is_dir():
+        raise FileError(f"{path}: expected a file name, found a folder")
+    if not suffixes and path.exists() and not path.is_dir():
+        raise FileError(f"{path}: expected a folder, found a file")
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise InputError(f"{path}: expected a name ending in {' '.join(suffixes)}, got {path.suffix or 'no suffix'}")
+    folder = path.parent
+    if not folder.is_dir():
+        raise FileError(f"{path}: the folder {folder} does not exist")
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise FileError(f"{path}: the folder {folder} is not writable ({error.strerror or error})") from error
+    return path
+
+
+def check_apart(output: Path, *inputs: Path) -> None:
+    """Refuse an output that is one of the inputs, whatever it is called."""
+    if output.exists() and any(path.exists() and path.samefile(output) for path in inputs):
+        raise InputError(f"{output}: is also an input, which would be lost; give the output another name")
+
+
+def check_image(path: Path) -> Path:
+    """`check_output` for an image file."""
+    from ..image import IMAGE_SUFFIXES
+
+    return check_output(path, IMAGE_SUFFIXES)
+
+
+@contextmanager
+def whole_folder(path: Path, stale: str = "") -> Iterator[Path]:
+    """Give a temporary folder to fill; when all went well its files appear in `path`, else nothing does.
+
+    In a folder that exists, files of the same name are replaced, and in a folder of views (it holds a rig.json)
+    others that match the pattern `stale` are removed.
+    """
+    check_output(path)
+    temporary = path.parent / f".part-{secrets.token_hex(4)}"  # no suffix: it is a folder
+    try:
+        temporary.mkdir()
+        yield temporary
+        if path.is_dir():
+            made = sorted(temporary.iterdir())
+            ours = (path / "rig.json").exists()  # a folder of this program's
+            leftovers = list(path.glob(stale)) if stale and ours else []
+            for item in made:
+                os.replace(item, path / item.name)
+            for old in leftovers:
+                if old.name not in {item.name for item in made}:
+                    old.unlink()
+        else:
+            os.replace(temporary, path)
+    except OSError as error:
+        if isinstance(error, FileError):
+            raise
+        raise FileError(f"{path}: cannot be written ({error.strerror or error})") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)

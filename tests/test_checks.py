@@ -1,0 +1,141 @@
+"""Absurd numbers and arrays of the wrong kind: one sentence that says the range, or what was found."""
+
+from __future__ import annotations
+
+from datetime import date
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import autostereo as aus
+from autostereo.checks import check_number, check_views, real_array
+from autostereo.render import make_camera
+
+CORNERS, FACES = [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]
+VALUES = np.arange(27.0).reshape(3, 3, 3)
+
+
+def scaled(factor):
+    return np.diag([factor, 1, 1, 1])
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: aus.Rig(position=(0, 0, 1e300)), r"rig position: expected three numbers within ±1e\+15"),
+        (lambda: aus.Rig(target=(0, 1e16, 0)), r"rig target: expected three numbers within ±1e\+15"),
+        (lambda: aus.Rig(up=(0, 1e300, 0)), r"rig up: expected three numbers within ±1e\+30"),
+        (lambda: aus.Rig(up=(0, 1e-300, 0)), "rig up: expected a vector of some length"),
+        (lambda: aus.Rig(position=(0, 0, 1e-160)), "position and target must differ"),
+        (lambda: aus.Rig(baseline=1e300), r"rig baseline: expected a number from 0 to 1e\+15, got 1e\+300"),
+        (lambda: aus.Rig(baseline=1j), "rig baseline: expected a number, got 1j"),
+        (lambda: aus.Rig(focal_distance=1e-300), "rig focal_distance: expected a number from 1e-30 to"),
+        (lambda: aus.Rig(near=1e-300), "rig near: expected a number from 1e-30 to"),
+        (lambda: aus.Rig(aspect=1e-300), "rig aspect: expected a number from 1e-06 to"),
+        (lambda: aus.Rig(fov_y=1e-300), "rig fov_y: expected a number from 0.001 to 179"),
+        (lambda: aus.Rig(offset_y=-1e16), "rig offset_y: expected a number from"),
+        (lambda: aus.Rig(offsets=(-1e300, 1e300)), r"rig offsets: expected numbers within ±1e\+15"),
+        (lambda: aus.Rig(views=10**30), "rig views: expected a whole number 1…4096"),
+        (lambda: aus.Rig(offsets=range(5000)), "rig views: expected a whole number 1…4096, got 5000"),
+        (lambda: aus.ViewMap(10**30, np.zeros((1, 1, 3), int)), "views: expected a whole number 1…4096"),
+        (lambda: aus.Points(CORNERS, radii=1e300), r"radii: expected radii up to 1e\+30"),
+        (lambda: aus.Points(CORNERS, radii=1e20, transform=scaled(1e20)), r"radii: expected radii up to 1e\+30"),
+        (lambda: aus.Points(np.multiply(CORNERS, 1e20), transform=scaled(1e20)), "positions: expected places in the"),
+        (lambda: aus.Mesh(np.multiply(CORNERS, 1e20), FACES, transform=scaled(1e20)), "vertices: expected places in"),
+        (lambda: aus.Mesh(CORNERS, FACES, normals=[(0, 0, 1e300)] * 3), r"normals: expected numbers within ±1e\+30"),
+        (lambda: aus.Mesh(CORNERS, FACES, transform=scaled(1e300)), r"transform: expected numbers within ±1e\+30"),
+        (lambda: aus.Volume(VALUES, spacing=(1e300, 1, 1)), r"spacing: expected three numbers within ±1e\+30"),
+        (lambda: aus.Volume(VALUES, spacing=(1e20, 1, 1)), r"spacing: expected voxels of 1e-30 and more within"),
+        (lambda: aus.Volume(VALUES, origin=(1e300, 0, 0)), r"origin: expected three numbers within ±1e\+30"),
+        (lambda: aus.Volume(VALUES * 1e300), r"values: expected numbers within ±1e\+30, found 0…2.6e\+301"),
+        (lambda: aus.Volume(VALUES, mode="iso", iso=1e300), "iso: expected a number from"),
+        (lambda: aus.Volume(VALUES, clip_box=[(0, 0, 0), (1, 1, 1e300)]), r"clip_box: expected numbers within ±1e\+30"),
+        (lambda: aus.DirectionalLight((0, 0, -1e-300)), "light direction: expected a vector of some length"),
+        (lambda: aus.DirectionalLight((0, 0, -1e300)), "light direction: expected three numbers within"),
+        (lambda: aus.PointLight((0, 0, 1e16)), "light position: expected three numbers within"),
+        (lambda: aus.PointLight((0, 0, 1), color=(1e300, 1, 1)), "light color: expected three numbers within"),
+    ],
+)  # fmt: skip
+def test_absurd_numbers_are_refused(make, words):
+    with pytest.raises(aus.InputError, match=words):
+        make()
+
+
+def test_ends_of_the_ranges_are_taken():
+    aus.Rig(position=(0, 0, 1e15), baseline=1e15, fov_y=0.001, aspect=1e6, near=1e-30, views=4096)
+    aus.Mesh(np.multiply(CORNERS, 1e30), FACES)
+    aus.Points(CORNERS, radii=1e30)
+    aus.Volume(VALUES, clip_box=[(-np.inf,) * 3, (np.inf,) * 3])
+
+
+def test_cameras_whose_parallax_cannot_be_counted():
+    """Every number is in its range, but pixels would be counted beyond 32 bits."""
+    with pytest.raises(aus.InputError, match=r"compare baseline \(or aperture\) and focal_distance"):
+        make_camera(aus.Rig(focal_distance=1e-30, baseline=1e15), (8, 8))
+    with pytest.raises(aus.InputError, match=r"compare baseline \(or aperture\) and focal_distance"):
+        make_camera(aus.Rig(focal_distance=1e-30, offset_y=1e15), (8, 8))
+    with pytest.raises(aus.InputError, match=r"compare baseline \(or aperture\) and focal_distance"):
+        make_camera(aus.Rig(focal_distance=1e-30, baseline=0), (8, 8), aperture=1e15)
+
+
+def test_up_may_be_short():
+    assert np.array_equal(aus.Rig(up=(0, 1e-20, 0)).eye_from_world, aus.Rig().eye_from_world)
+
+
+WRONG = [
+    (lambda a: a + 1j, "got complex numbers"),
+    (lambda a: a.astype("U9"), "got text"),
+    (lambda a: a.astype("U9").tolist(), "got text"),
+    (lambda a: a.astype("S9"), "got bytes"),
+    (lambda a: a.astype(np.int64).astype("datetime64[s]"), "got dates"),
+    (lambda a: a.astype(np.int64).astype("timedelta64[s]"), "got spans of time"),
+    (lambda a: np.full(a.shape, date(2026, 1, 1), object), "got ndarray"),
+    (lambda a: np.full(a.shape, "1", object), "got ndarray"),
+    (lambda a: np.ma.array(a, mask=np.arange(a.size).reshape(a.shape) == 1), "found 1 masked entries"),
+]
+FIELDS = {
+    "vertices": (np.array(CORNERS), lambda a: aus.Mesh(a, FACES)),
+    "faces": (np.array(FACES), lambda a: aus.Mesh(CORNERS, a)),
+    "normals": (np.ones((3, 3)), lambda a: aus.Mesh(CORNERS, FACES, normals=a)),
+    "colors": (np.ones((3, 3)), lambda a: aus.Mesh(CORNERS, FACES, colors=a)),
+    "uv": (np.ones((3, 2)), lambda a: aus.Mesh(CORNERS, FACES, uv=a)),
+    "transform": (np.eye(4), lambda a: aus.Mesh(CORNERS, FACES, transform=a)),
+    "positions": (np.array(CORNERS), lambda a: aus.Points(a, radii=1)),
+    "radii": (np.ones(3), lambda a: aus.Points(CORNERS, radii=a)),
+    "values": (VALUES, aus.Volume),
+    "spacing": (np.ones(3), lambda a: aus.Volume(VALUES, spacing=a)),
+    "direction": (np.eye(3), lambda a: aus.Volume(VALUES, direction=a)),
+    "clip_plane": (np.ones(4), lambda a: aus.Volume(VALUES, clip_plane=a)),
+    "transfer points": (np.array([(0, 0, 0, 0, 0), (1, 1, 1, 1, 1)]), aus.TransferFunction),
+    "rig offsets": (np.array([-1.0, 0.0, 1.0]), lambda a: aus.Rig(offsets=a)),
+    "rig position": (np.array([0.0, 0.0, 4.0]), lambda a: aus.Rig(position=a)),
+    "table": (np.array([[[0, 1, 0]]]), lambda a: aus.Display.from_table(8, 8, 2, a)),
+}
+
+
+@pytest.mark.parametrize("field", FIELDS)
+@pytest.mark.parametrize(("spoil", "words"), WRONG)
+def test_arrays_of_the_wrong_kind_are_refused(field, spoil, words):
+    good, make = FIELDS[field]
+    make(good)
+    make(np.ma.array(good))  # nothing of it is masked
+    with pytest.raises(aus.InputError, match=f"{field}: expected .*{words}"):
+        make(spoil(np.asarray(good)))
+
+
+def test_one_number():
+    assert check_number("x", np.float32(0.5), 0, 1) == 0.5 and check_number("x", Fraction(1, 4)) == 0.25
+    for bad in (True, np.True_, "1", 1j, None, [1.0], np.datetime64(1, "s"), np.ones(1)):
+        with pytest.raises(aus.InputError, match="x: expected a number, got"):
+            check_number("x", bad)
+    for bad in (np.nan, np.inf, 10**400, -0.1, 1.1):
+        with pytest.raises(aus.InputError, match="x: expected a number from 0 to 1, got"):
+            check_number("x", bad, 0, 1)
+    for bad in (0, 4097, True, 2.0, "2", None):
+        with pytest.raises(aus.InputError, match="views: expected a whole number 1…4096, got"):
+            check_views(bad)
+
+
+def test_wide_whole_numbers_are_numbers():
+    assert real_array("x", [10**25, Fraction(1, 2)]).tolist() == [1e25, 0.5]
