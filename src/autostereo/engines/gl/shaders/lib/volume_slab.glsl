@@ -24,8 +24,11 @@ vec3 glow;                               // colour under light times optical dep
 #ifdef HALF_DEPTH
 LANE fill_begin, fill_end;               // between which depths it holds anything
 #endif
-vec3 lit_front[VOLUMES], lit_back[VOLUMES];        // what light multiplies colours by
-vec3 shine_front[VOLUMES], shine_back[VOLUMES];    // and what it adds
+vec3 lit[VOLUMES], shine[VOLUMES];       // what light multiplies colours by, and what it adds
+#ifndef MIDDLE
+struct Gradients { LANE x, y, z; };
+Gradients g_front[VOLUMES], g_back[VOLUMES];  // at its ends
+#endif
 
 SLAB slab_texel(int v, int l) {
     vec2 place = vec2(of(s_back[v], l), of(s_front[v], l)) * table_place[v].x + table_place[v].y;
@@ -41,25 +44,30 @@ SLAB slab_texel(int v, int l) {
 // Light on lane l of volume v; that of lane 0 for all that are not looked up.
 void visit(int v, int l, vec4 voxel) {
 #ifdef SHADED
-#ifdef MIDDLE
     float t = 0.5 * (of(near_end[v], l) + of(far_end[v], l));
-    voxel = voxel_on_ray(v, l, t);
+#ifdef MIDDLE
+    vec3 gradient = gradient_of(voxel_on_ray(v, l, t));
 #else
-    float t = of(far_end[v], l);
+    vec3 found = gradient_of(voxel);
+    vec3 before = vec3(of(g_front[v].x, l), of(g_front[v].y, l), of(g_front[v].z, l));
+    vec3 gradient = 0.5 * (before + found);
+    g_back[v].x = l == 0 ? LANE(found.x) : with(g_back[v].x, l, found.x);
+    g_back[v].y = l == 0 ? LANE(found.y) : with(g_back[v].y, l, found.y);
+    g_back[v].z = l == 0 ? LANE(found.z) : with(g_back[v].z, l, found.z);
 #endif
     vec3 eye = vec3(0.0, lens.w, 0.0), reflected, highlight;
 #ifdef OWN_EYES
     eye.x = of(origin_x, l);
 #endif
-    light_inside(v, gradient_of(voxel), eye_point(l, t), eye, reflected, highlight);
+    light_inside(v, gradient, eye_point(l, t), eye, reflected, highlight);
     reflected = by_lane(reflected);
     highlight = by_lane(highlight);
 #if LANES == 3
-    lit_back[v] = l == 0 ? reflected : with(lit_back[v], l, of(reflected, l));
-    shine_back[v] = l == 0 ? highlight : with(shine_back[v], l, of(highlight, l));
+    lit[v] = l == 0 ? reflected : with(lit[v], l, of(reflected, l));
+    shine[v] = l == 0 ? highlight : with(shine[v], l, of(highlight, l));
 #else
-    lit_back[v] = reflected;
-    shine_back[v] = highlight;
+    lit[v] = reflected;
+    shine[v] = highlight;
 #endif
 #endif
 }
@@ -75,12 +83,7 @@ void add_to_slab(int v, int l) {
     float extinction = texel.a;
 #endif
 #ifdef SHADED
-#ifdef MIDDLE
-    own = own * part(lit_back[v], l) + extinction * part(shine_back[v], l);
-#else
-    own *= 0.5 * (part(lit_front[v], l) + part(lit_back[v], l));
-    own += 0.5 * extinction * (part(shine_front[v], l) + part(shine_back[v], l));
-#endif
+    own = own * part(lit[v], l) + extinction * part(shine[v], l);
 #endif
     optical = with(optical, l, of(optical, l) + extinction * length_here);
     glow = with_part(glow, l, part(glow, l) + own * length_here);
@@ -104,7 +107,8 @@ LANE slab_alpha() {
             add_to_slab(v, l);
         }
     }
-    lit_front = lit_back;
-    shine_front = shine_back;
+#ifndef MIDDLE
+    g_front = g_back;
+#endif
     return 1.0 - exp(-optical);
 }
