@@ -150,3 +150,10 @@ def test_surfels_that_reach_from_far_to_the_eye():
         if (points.positions @ rig.eye_from_world[2, :3] + rig.eye_from_world[2, 3]).max() > 0:
             stack = aus.render_views(points, rig, (8, 8), engine="cpu", options=aus.Options(depth=True))
             assert ((stack.depth > 0) & (np.isfinite(stack.depth) == (stack.color[..., 3] > 0))).all()
+
+
+def test_a_huge_triangle_is_cut_at_the_near_plane():
+    """Its new corners are not before it by a rounding, where they would have no place in the picture (a warning)."""
+    mesh = aus.Mesh([(-1e15, -1e15, -1e15), (1e15, -1e15, 1e15), (0, 1e15, 1e15)], FACES)
+    for engine in ("reference", "cpu"):
+        assert aus.render_views(mesh, aus.Rig(views=2), (8, 8), engine=engine).views == 2
