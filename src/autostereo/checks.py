@@ -1,8 +1,8 @@
 """Checks of what a user hands over: one number in a range, arrays of real numbers.
 
 One rule of size. Engines calculate in float32, so every number of a scene lies within ±LARGEST, which float32 holds;
-places and lengths of cameras, lights and volumes, which are multiplied with each other, within ±FARTHEST, whose square
-it holds; and a length that has to be > 0 is at least SMALLEST.
+places and lengths in the world, which are multiplied with each other, within ±FARTHEST, whose square it holds; and a
+length of rigs and voxels that has to be > 0 is at least SMALLEST.
 """
 
 from __future__ import annotations

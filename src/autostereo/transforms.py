@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .checks import LARGEST, SMALLEST, check_reach, real_array
+from .checks import FARTHEST, SMALLEST, check_reach, real_array
 from .errors import InputError
 
 Array = NDArray[np.float64]
@@ -27,11 +27,11 @@ def as_transform(matrix: ArrayLike | None, name: str = "transform") -> Array:
 
 
 def check_world(name: str, transform: Array, points: Array) -> None:
-    """Raise InputError when `transform` may take one of points (N, 3) beyond ±LARGEST."""
+    """Raise InputError when `transform` may take one of points (N, 3) beyond ±FARTHEST."""
     farthest = np.maximum(-points.min(axis=0, initial=0.0), points.max(axis=0, initial=0.0))
     reach = np.abs(transform[:3, :3]) @ farthest + np.abs(transform[:3, 3])
-    if reach.max() > LARGEST:
-        raise InputError(f"{name}: expected places in the world within ±{LARGEST:g}, found up to ±{reach.max():g}")
+    if reach.max() > FARTHEST:
+        raise InputError(f"{name}: expected places in the world within ±{FARTHEST:g}, found up to ±{reach.max():g}")
 
 
 def translation(x: float, y: float, z: float) -> Array:

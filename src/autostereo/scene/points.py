@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import LARGEST, real_array
+from ..checks import FARTHEST, real_array
 from ..errors import InputError
 from ..transforms import apply, apply_normals, as_transform, check_world
 from .appearance import Material
@@ -73,8 +73,8 @@ class Points:
         put(self, "transform", as_transform(self.transform))
         check_world("positions", self.transform, self.positions)
         widest = self.radii.max() * np.linalg.norm(self.transform[:3, :3], 2)
-        if widest > LARGEST:
-            raise InputError(f"radii: expected radii up to {LARGEST:g} in the world, found up to {widest:g}")
+        if widest > FARTHEST:
+            raise InputError(f"radii: expected radii up to {FARTHEST:g} in the world, found up to {widest:g}")
 
     def __len__(self) -> int:
         return len(self.positions)

@@ -28,6 +28,7 @@ from .scalars import ONE, TINY, ZERO, exp2_fast, log2_fast
 FOUR, HALF, QUARTER = np.float32(4.0), np.float32(0.5), np.float32(0.25)
 LEAST = np.float32(LEAST_RADIUS)
 FLOOR = np.float32(1e-12)
+CLOSEST = np.float32(1e-6)  # least depth relative to the centre's: 1 + d has no digits below
 NO_CHORD = (ZERO,) * 9
 
 
@@ -74,13 +75,14 @@ def cut_disc(record, y, lens, back):
     half_x, half_d = half * tx, half * nx
     if back:
         half_x, half_d = -half_x, -half_d
-    s1, s2, plane = -ONE, ONE, near * inverse
+    s1, s2, plane = -ONE, ONE, max(near * inverse, CLOSEST)
     if ONE + foot_d - abs(half_d) < plane:  # an end lies before the near plane
         if ONE + foot_d + abs(half_d) < plane:
             return False, NO_CHORD
         cut = (plane - ONE - foot_d) / half_d
         s1, s2 = (max(cut, s1), s2) if half_d > ZERO else (s1, min(cut, s2))
-    d1, d2 = foot_d + s1 * half_d, foot_d + s2 * half_d
+    # an end on the near plane is there to within a rounding of the disc's size, which may be the other side of the eye
+    d1, d2 = max(foot_d + s1 * half_d, plane - ONE), max(foot_d + s2 * half_d, plane - ONE)
     z1, z2 = ONE / (ONE + d1), ONE / (ONE + d2)
     x1 = record[X] + fx * (foot_x + s1 * half_x - a * d1) * z1
     x2 = record[X] + fx * (foot_x + s2 * half_x - a * d2) * z2

@@ -198,7 +198,8 @@ def clip_near(corners: Array, near: float) -> Array:
         if p[2] >= near:
             kept.append(p)
         if (p[2] >= near) != (q[2] >= near):
-            kept.append(p + (near - p[2]) / (q[2] - p[2]) * (q - p))
+            cut = p + (near - p[2]) / (q[2] - p[2]) * (q - p)
+            kept.append(np.array([cut[0], cut[1], near]))  # of a huge triangle, cut's own depth may be rounded to 0
     return np.array(kept).reshape(-1, 3)
 
 
