@@ -11,6 +11,7 @@ import pytest
 import autostereo as aus
 from autostereo import Renderer
 from autostereo.scene.samples import surfel_cloud
+from gl_device import need_device
 
 DOOR = importlib.import_module("autostereo.render")  # the module: the package gives the function of that name
 RIG = aus.Rig(position=(0, 0, 4), fov_y=40, baseline=1.2, views=12, near=0.2)
@@ -18,6 +19,11 @@ SIZE = (1280, 960)
 TABLE = aus.Display.slanted(*SIZE, 12, lens_pitch=5.7, subpixel_pitch=1.0, slant_deg=9.46)
 PICTURE = 4 * SIZE[0] * SIZE[1]
 SMALL = 8_000_000  # bytes of what is no picture: bands of rows, triangles, offsets
+PACKED = {
+    "side by side": aus.Display.stereo(*SIZE, layout="side-by-side"),
+    "frame packing": aus.Display.stereo(1920, 1080, layout="frame-packing-1080p"),
+    "depth": aus.Display.rgbd(2 * SIZE[0], SIZE[1]),
+}
 
 
 def triangle() -> aus.Scene:
@@ -36,8 +42,7 @@ def frame(scene: aus.Scene, what: str, method: str, engine: str, **options: obje
     if what == "views":
         Renderer(scene, engine).render_views(RIG, SIZE, method=method, options=given)
     else:
-        display = {"panel": TABLE, "packed": aus.Display.stereo(*SIZE, layout="row-interleaved")}[what]
-        Renderer(scene, engine).render(display, RIG, method=method, options=given)
+        Renderer(scene, engine).render(PACKED.get(what, TABLE), RIG, method=method, options=given)
 
 
 CASES = {
@@ -57,7 +62,7 @@ CASES = {
     "panel of small views": (triangle, "panel", "n-pass-subres", {}),
     "panel of small views, sub-pixels": (mixed, "panel", "n-pass-subres", {"sampling": "subpixel"}),
     "panel, warped": (triangle, "panel", "dibr", {"references": 7}),
-    "packed": (triangle, "packed", "single-pass", {}),
+    **{f"packed {name}": (triangle, name, "single-pass", {}) for name in PACKED},
 }  # fmt: skip
 
 
@@ -74,6 +79,7 @@ def test_what_is_asked_for_is_what_is_taken(name: str, monkeypatch: pytest.Monke
     finally:
         tracemalloc.stop()
     assert taken - SMALL <= asked[0] <= 1.15 * taken + PICTURE // 2
+    assert asked[0] >= 0.55 * taken  # of what is small, too
 
 
 def test_parts_that_fit_one_by_one_are_refused_together(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -88,9 +94,25 @@ def test_parts_that_fit_one_by_one_are_refused_together(monkeypatch: pytest.Monk
 
 
 def test_what_is_held_already_is_not_asked_for_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    renderer, asked = Renderer(triangle(), "cpu"), []
+    for make, depths in ((triangle, 0), (mixed, RIG.views * PICTURE)):
+        renderer, asked = Renderer(make(), "cpu"), list[int]()
+        monkeypatch.setattr(DOOR, "check_memory", lambda need, what, asked=asked: asked.append(need))
+        for _ in range(2):
+            renderer.render_views(RIG, SIZE)
+        renderer.render(TABLE, RIG, out=np.empty((SIZE[1], SIZE[0], 3), np.uint8))
+        assert asked == [RIG.views * PICTURE + depths, 0, 0]
+
+
+def test_software_opengl_asks_for_its_textures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They lie in main memory: 8 bytes a pixel of all views, and a panel; of what a process grows, the most."""
+    if need_device().is_hardware:
+        pytest.skip("a GPU has memory of its own")
+    asked: list[int] = []
     monkeypatch.setattr(DOOR, "check_memory", lambda need, what: asked.append(need))
+    renderer = Renderer(mixed(), "gl")
     for _ in range(2):
         renderer.render_views(RIG, SIZE)
-    renderer.render(TABLE, RIG, out=np.empty((SIZE[1], SIZE[0], 3), np.uint8))
-    assert asked == [RIG.views * PICTURE, 0, 0]
+    for _ in range(2):
+        renderer.render(TABLE, RIG, method="n-pass")
+    views, panel = RIG.views * PICTURE, 3 * PICTURE // 4
+    assert asked == [views + 2 * views, 0, panel + PICTURE, 0]

@@ -121,3 +121,13 @@ def test_the_command_line_packs_frames(cli: Run, folder: Path) -> None:
     left, right = tiles(pixels("eyes.png"), "frame-packing-720p")
     assert place(left, 0).size == place(right, 2).size == 2 and not pixels("eyes.png")[720:750].any()
     refused(cli("render", "square.off", "-d", "frame-packing-720p", "--size", "64x64"), "expected 1280×720")
+
+
+def test_a_reversed_map_of_depth_is_dark_in_front():
+    """2D + depth: `reverse` inverts the depth, and leaves the picture and the header as they are."""
+    display = aus.Display.rgbd(320, 160)
+    plain, turned = (aus.render(SCENE, d, aus.Rig(baseline=0.5)).pixels for d in (display, display.swapped()))
+    assert np.array_equal(plain[:, :160], turned[:, :160])
+    light, dark = plain[1:, 160:].astype(int), turned[1:, 160:].astype(int)
+    assert np.abs(light + dark - 255).max() <= 1 and np.ptp(light) > 10
+    assert light[-1].max() < 128 < light.max()  # red, above, is in front; what is below lies behind

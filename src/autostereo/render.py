@@ -27,6 +27,8 @@ from .scene.scene import Scene
 from .scene.transfer import TransferFunction
 from .scene.volume import Volume
 
+PACKING = {"rgbd": 7}  # bytes for each pixel of a packed picture, its parts included; else 3
+
 
 def render(
     scene: Any, display: Display, rig: Rig | None = None, *, method: str = "single-pass", engine: str = "auto",
@@ -219,11 +221,12 @@ class Renderer:
         """Pictures for displays without a mask: packed views, anaglyph, 2D + depth."""
         rig = replace(rig, aspect=rig.aspect or display.aspect)
         options = replace(options, depth=display.layout == "rgbd")
-        stack = self._render_views(rig, display.view_size, method, options, None, 3 * display.width * display.height)
+        packed = PACKING.get(display.layout, 3) * int(np.prod(display.picture_size))
+        stack = self._render_views(rig, display.view_size, method, options, None, packed)
         if display.layout == "rgbd":
             assert stack.depth is not None
             scale = make_camera(rig, display.view_size).fx * rig.baseline / 8  # as adjacent views of a panel of 9
-            disparity = disparity_map(stack.depth[0], rig.focal, scale, display.comfort)
+            disparity = disparity_map(stack.depth[0], rig.focal, scale, display.comfort, display.eyes_swapped)
             pixels = wowvx(stack.color[0], disparity, anamorphic=True)
         else:
             pixels = pack(stack.color, display.layout, swap=display.eyes_swapped, anamorphic=True)

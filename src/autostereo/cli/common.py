@@ -198,7 +198,7 @@ def announce_compilation(engine: str, *kernels: str) -> None:
 
 def note_reuse(picture: Any, draw: Callable[..., Any], options: Options) -> None:
     """Say which share of the samples was reused, and how near the picture comes to `draw` with exact shading."""
-    if picture.reused is None:
+    if picture.reused is None or STATE.quiet:
         return
     said = f"{picture.reused:.0%} of the samples have a nearby view's colour"
     try:

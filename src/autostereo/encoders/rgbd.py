@@ -56,10 +56,12 @@ def disparity_map(
             raise InputError(f"{name}: expected a number > 0, got {value!r}")
     if not 0 <= scale < np.inf:
         raise InputError(f"scale: expected a number ≥ 0, got {scale!r}")
+    shown = np.empty(depth.shape, np.uint8)
     with np.errstate(over="ignore"):  # 1/d of the smallest numbers; clipped below
-        parallax = scale / comfort * (1 / focal - 1 / np.asarray(depth, dtype=np.float64))
-    shade: NDArray[np.float64] = 127.5 * (1 + np.clip(parallax if invert else -parallax, -1, 1))
-    return (shade + 0.5).astype(np.uint8)
+        for row, shades in zip(depth, shown, strict=True):  # a row at a time: float64 takes eight times the memory
+            parallax = scale / comfort * (1 / focal - 1 / row.astype(np.float64))
+            shades[:] = 127.5 * (1 + np.clip(parallax if invert else -parallax, -1, 1)) + 0.5
+    return shown
 
 
 def rgbd(color: Pixels, disparity: Pixels, side: str = "right") -> Pixels:

@@ -86,11 +86,12 @@ class CpuEngine:
         """Depths of scenes that are drawn in stages, and sums of samples; meshes alone need neither."""
         if prepared.points is None and prepared.volumes is None:
             return 0
-        panel = draw.viewmap is not None
+        panel, given = draw.viewmap is not None, draw.viewmap is None and draw.options.depth
         values, samples = (3, 3) if panel else (4 * len(draw.offsets), len(draw.offsets))  # a pixel has
-        depths = int(prepared.several and (panel or not draw.options.depth))
-        means = int(draw.options.samples > 1)
-        return draw.pixels * (4 * samples * (depths + means * draw.options.depth) + 2 * values * means)
+        own = prepared.several and not given
+        depths = prepared.memory.missing("depth", (draw.pixels, samples), np.float32) if own else 0
+        means = draw.pixels * (2 * values + 4 * samples * given) if draw.options.samples > 1 else 0
+        return depths + means
 
     def draw(self, prepared: Prepared, draw: Draw, target: Target) -> None:
         """Draw a stack of views, or straight to the panel."""

@@ -45,6 +45,12 @@ class Memory:
             held = self._buffers[name] = np.empty(count, dtype)
         return held[:count].reshape(shape)
 
+    def missing(self, name: str, shape: tuple[int, ...], dtype: type) -> int:
+        """Bytes that `buffer` would have to take for this array."""
+        count, held = int(np.prod(shape)), self._buffers.get(name)
+        fits = held is not None and held.size >= count and held.dtype == dtype
+        return 0 if fits else count * np.dtype(dtype).itemsize
+
     def pool(self, key: tuple[Any, ...], make: Callable[[], Any]) -> Pool:
         """Memory for tasks of this kind, key[0], and size; what another size needed is let go."""
         if key not in self._pools:

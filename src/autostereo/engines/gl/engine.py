@@ -128,8 +128,8 @@ class GlEngine:
             return replace(prepared, scene=scene, stages=make_stages(device, scene, prepared.middle, prepared))
 
     def beside(self, prepared: Prepared, draw: Draw) -> int:
-        """Pictures are the device's."""
-        return 0
+        """On software OpenGL textures lie in main memory, too; a GPU has its own."""
+        return 0 if self.device.is_hardware else frames.texture_bytes(draw, self.device.limits, prepared.kept)
 
     def draw(self, prepared: Prepared, draw: Draw, target: Target) -> None:
         """Draw a stack of views, or a panel, by `draw.method`."""

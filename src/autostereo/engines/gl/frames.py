@@ -13,13 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import UnsupportedError
-from ..engine import Target, small_camera
+from ..engine import Draw, Target, small_camera
 from ..gathering import Tiles
 from .atlas import Atlas, Layout
 from .blocks import stored_background
-from .job import CLEARLY, Job, Stage
+from .context import Limits
+from .job import CLEARLY, Job, Kept, Stage
 from .panel import ALL, NOTHING, Mean, Panel, write_only
 
+PIXEL_BYTES, PANEL_BYTES, MEAN_BYTES = 8, 4, 16  # of a pixel of an atlas, with depth; of a panel; of a mean
 CHANNELS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -36,6 +38,25 @@ def atlases(job: Job, name: str = "atlas") -> Iterator[Job]:
     atlas = job.kept.get(name, layout, lambda: Atlas(job.device, layout))
     for first in range(0, views, layout.count):
         yield job.with_atlas(atlas, first, min(layout.count, views - first))
+
+
+def texture_bytes(draw: Draw, limits: Limits, kept: Kept) -> int:
+    """Bytes of the textures that pictures are drawn into, but for those that are kept from the frame before.
+
+    Of panels in one pass it is the most: where it is faster they are drawn with fewer.
+    """
+    panel = draw.viewmap is not None
+    small = panel and draw.method == "n-pass-subres"
+    camera = small_camera(draw) if small else draw.camera
+    channels = draw.viewmap is not None and draw.viewmap.continuous and not draw.method.startswith("n-pass")
+    name = "channels" if channels else "small atlas" if small else "atlas"
+    layout = Layout.fitting(3 if channels else len(draw.offsets), (camera.width, camera.height), limits)
+    width, height = layout.size
+    atlas = 0 if kept.holds(name, layout) else PIXEL_BYTES * width * height
+    panels = PANEL_BYTES * draw.pixels if panel and "panel" not in kept else 0
+    if draw.options.samples > 1 and "mean" not in kept and "panel mean" not in kept:
+        atlas += MEAN_BYTES * (draw.pixels if panel and not small else width * height)
+    return atlas + panels
 
 
 def passes(job: Job) -> Iterator[range]:

@@ -30,9 +30,13 @@ class Kept:
     def __contains__(self, name: Hashable) -> bool:
         return name in self._made
 
+    def holds(self, name: Hashable, key: Any) -> bool:
+        """Whether `get` would make nothing."""
+        return name in self._made and bool(self._made[name][0] == key)
+
     def get(self, name: Hashable, key: Any, make: Callable[[], Any]) -> Any:
         """What `make` returned for `name` and this key; with another key the old one is let go and made anew."""
-        if name not in self._made or self._made[name][0] != key:
+        if not self.holds(name, key):
             self._made.pop(name, None)
             self._made[name] = key, make()
         return self._made[name][1]

@@ -22,7 +22,7 @@ from .picture import visible_hits as visible_hits
 from .points import Surfels
 from .volume import Field
 
-SAMPLE_BYTES = 250  # of what is held for a sample of a picture
+SAMPLE_BYTES = 250  # of what is held for a sample of a picture of triangles
 
 Array = NDArray[np.float64]
 
