@@ -90,10 +90,10 @@ def quilt(
     drawn = partial(render_views, scene, rig, layout.tile, method=method, engine=engine)
     with common.working(f"rendering {rig.views} views"):
         stack = drawn(options=options)
-    common.note_reuse(stack, drawn, options)
     with common.working("writing"):
         save_quilt(path, stack, layout)
     say(f"{path}  {layout.width}×{layout.height}")
+    common.note_reuse(stack, drawn, options)
 
 
 def _place(output: str | None, own: str) -> Path:

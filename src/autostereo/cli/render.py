@@ -85,9 +85,9 @@ def render(
     with common.working("rendering"):
         panel = drawn(options=options)
     note(f"rendered in {perf_counter() - start:.2f} s")
-    common.note_reuse(panel, drawn, options)
     with common.working("writing"):
         panel.save(path)
     if not path.stem.endswith(ending):
         note(f"{path}: its device wants a name that ends in {ending}, such as {path.stem}{ending}{path.suffix}")
     say(f"{path}  {panel.width}×{panel.height}")
+    common.note_reuse(panel, drawn, options)

@@ -105,8 +105,8 @@ def views(
     drawn = partial(render_views, scene, rig, pixels, method=method, engine=engine)
     with common.working(f"rendering {rig.views} views"):
         stack = drawn(options=options)
-    common.note_reuse(stack, drawn, options)
     write_views(output, stack, rig)
+    common.note_reuse(stack, drawn, options)
 
 
 def write_views(output: Path, stack: ViewStack, rig: Rig) -> None:
