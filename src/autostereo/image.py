@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import FileError, InputError
+from .temporary import holding
 
 IMAGE_SUFFIXES = (".png", ".webp", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 
@@ -38,15 +39,13 @@ def write_atomic(path: str | os.PathLike[str], write: Callable[[BinaryIO], objec
         raise FileError(f"{path}: the folder {folder} does not exist")
     if path.is_dir():
         raise FileError(f"{path}: expected a file name, found a folder")
-    temporary = folder / f".{path.name}.{secrets.token_hex(4)}.part"
     try:
-        with open(temporary, "wb") as file:
-            write(file)
-        os.replace(temporary, path)
+        with holding(folder / f".{path.name}.{secrets.token_hex(4)}.part") as temporary:
+            with open(temporary, "wb") as file:
+                write(file)
+            os.replace(temporary, path)
     except OSError as error:
         raise FileError(f"{path}: cannot be written ({error.strerror or error})") from error
-    finally:
-        temporary.unlink(missing_ok=True)
     return path
 
 

@@ -7,24 +7,34 @@ import signal
 import sys
 
 
-def _leave(*_: object) -> None:
-    """End at once, as a later Ctrl-C does: while modules are imported there is nothing to clean up."""
-    os.write(2, b"autostereo: interrupted\n")
-    os._exit(130)
+def _leave(number: int, *_: object) -> None:
+    """End at once, whatever runs: Python drops exceptions within callbacks, and libraries' locks would stay locked."""
+    temporary = sys.modules.get("autostereo.temporary")
+    try:
+        if temporary is not None:
+            temporary.remove_all()
+        if number == signal.SIGINT:
+            os.write(2, (b"\r\x1b[K\x1b[?25h" if os.isatty(2) else b"") + b"autostereo: interrupted\n")  # and the cursor
+    finally:
+        os._exit(128 + number)
 
 
 def main() -> None:
     """Run the command line on sys.argv and exit with its status."""
-    usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # else Ctrl-C is to be ignored, as in nohup
-    try:
-        if usual:
-            signal.signal(signal.SIGINT, _leave)
-        from .app import run
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else Ctrl-C is to be ignored, as in nohup
+        signal.signal(signal.SIGINT, _leave)
+    signal.signal(signal.SIGTERM, _leave)
+    _speak_any_text()
+    from .app import run
 
-        signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))  # so that temporary files are removed
-        if usual:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
-        status = run(sys.argv[1:])
-    except KeyboardInterrupt:  # just before or just after what catches it
-        _leave()
-    sys.exit(status)
+    sys.exit(run(sys.argv[1:]))
+
+
+def _speak_any_text() -> None:
+    """Let what a terminal or a file cannot show become "?", and what is printed to a closed stream go nowhere."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:  # closed by the shell: >&-
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import secrets
-import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from ..errors import FileError, InputError
+from ..temporary import holding
 
 
 def check_output(path: Path, suffixes: tuple[str, ...] = ()) -> Path:
@@ -56,24 +56,27 @@ def whole_folder(path: Path, stale: str = "") -> Iterator[Path]:
     others that match the pattern `stale` are removed.
     """
     check_output(path)
-    temporary = path.parent / f".part-{secrets.token_hex(4)}"  # no suffix: it is a folder
     try:
-        temporary.mkdir()
-        yield temporary
-        if path.is_dir():
-            made = sorted(temporary.iterdir())
-            ours = (path / "rig.json").exists()  # a folder of this program's
-            leftovers = list(path.glob(stale)) if stale and ours else []
-            for item in made:
-                os.replace(item, path / item.name)
-            for old in leftovers:
-                if old.name not in {item.name for item in made}:
-                    old.unlink()
-        else:
-            os.replace(temporary, path)
+        with holding(path.parent / f".part-{secrets.token_hex(4)}") as temporary:  # no suffix: it is a folder
+            temporary.mkdir()
+            yield temporary
+            if path.is_dir():
+                _move_into(path, temporary, stale)
+            else:
+                os.replace(temporary, path)
     except OSError as error:
         if isinstance(error, FileError):
             raise
         raise FileError(f"{path}: cannot be written ({error.strerror or error})") from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _move_into(path: Path, temporary: Path, stale: str) -> None:
+    """Move what a folder holds into another; see `whole_folder`."""
+    made = sorted(temporary.iterdir())
+    ours = (path / "rig.json").exists()  # a folder of this program's
+    leftovers = list(path.glob(stale)) if stale and ours else []
+    for item in made:
+        os.replace(item, path / item.name)
+    for old in leftovers:
+        if old.name not in {item.name for item in made}:
+            old.unlink()

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import re
 import shutil
-import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FileError
+from ..temporary import scratch_folder
 from .files import check_start, numbers, whole_numbers
 
 HEADER = 1 << 20  # bytes of a file in which its header must end
@@ -55,13 +55,13 @@ def checked_metaimage(path: Path) -> Iterator[Path]:
     if not packed or len(files) > 1 or fields.get("CompressedDataSize") == str(length).encode():
         yield path
         return
-    with tempfile.TemporaryDirectory() as folder:
-        header = Path(folder) / "header.mhd"
+    with scratch_folder() as folder:
+        header = folder / "header.mhd"
         del fields["ElementDataFile"]  # which ends the header
         fields |= {"CompressedDataSize": str(length).encode(), "ElementDataFile": b"voxels.zraw"}
         lines = [key.encode() + b" = " + value for key, value in fields.items()]
         header.write_bytes(b"\n".join(lines) + b"\n")
-        with files[0].open("rb") as source, (Path(folder) / "voxels.zraw").open("wb") as target:
+        with files[0].open("rb") as source, (folder / "voxels.zraw").open("wb") as target:
             source.seek(start)
             shutil.copyfileobj(source, target)
         yield header

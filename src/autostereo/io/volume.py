@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import os
 import re
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ from numpy.typing import NDArray
 from ..checks import Vector, check_vector
 from ..errors import DependencyError, FileError, InputError
 from ..scene.volume import Volume
+from ..temporary import scratch_folder
 from .files import PathLike, check_start, read_bytes
 from .metaimage import checked_metaimage
 from .nifti import check_nifti
@@ -239,7 +239,7 @@ def without_space(path: Path) -> Iterator[Path]:
     else:
         name = lines[detached].split(":", 1)[1].strip()
         lines[detached] = f"data file: {path.parent.resolve() / name}"
-    with tempfile.TemporaryDirectory() as folder:
-        patched = Path(folder) / "header.nhdr"
+    with scratch_folder() as folder:
+        patched = folder / "header.nhdr"
         patched.write_text("\n".join(lines) + "\n\n", encoding="latin-1")
         yield patched

@@ -33,13 +33,18 @@ if hasattr(os, "register_at_fork"):
 
 
 def _join(futures: list[Future[None]]) -> None:
-    """Wait until no helper runs any more, also when Ctrl-C comes: the caller may free or reuse its arrays then."""
+    """Wait until no helper runs any more, also when Ctrl-C comes: the caller may free or reuse its arrays then.
+
+    Not when it comes again: a helper may wait for a lock that the first one has left locked.
+    """
     interrupt: KeyboardInterrupt | None = None
     while True:
         try:
             wait(futures)
             break
         except KeyboardInterrupt as error:
+            if interrupt is not None:
+                raise
             interrupt = error
     if interrupt is not None:
         raise interrupt
