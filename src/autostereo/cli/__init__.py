@@ -14,7 +14,8 @@ def _leave(number: int, *_: object) -> None:
         if temporary is not None:
             temporary.remove_all()
         if number == signal.SIGINT:
-            os.write(2, (b"\r\x1b[K\x1b[?25h" if os.isatty(2) else b"") + b"autostereo: interrupted\n")  # and the cursor
+            cursor = b"\r\x1b[K\x1b[?25h" if os.isatty(2) else b""  # shown again, on an empty line
+            os.write(2, cursor + b"autostereo: interrupted\n")
     finally:
         os._exit(128 + number)
 
