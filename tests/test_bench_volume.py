@@ -60,6 +60,9 @@ class Clockwork:
     def prepare(self, scene):
         return scene
 
+    def beside(self, prepared, draw):
+        return 0
+
     def draw(self, prepared, draw, target):
         self.now += 1.0 + (len(draw.offsets) if draw.viewmap is None else 0)
         self.drawn.append((draw, target.color.shape))

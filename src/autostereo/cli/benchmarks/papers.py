@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from . import papers_counts, papers_data, papers_mesh, papers_plane, papers_varyings, papers_volume
+from . import papers_counts, papers_data, papers_mesh, papers_plane, papers_quads, papers_varyings, papers_volume
 from .harness import machine_facts
 from .papers_published import ILLUMINATION_2008, PASSES_2008, SOURCES, VIEWS_2008, VOLUMES_512
 from .papers_studio import PapersStudio
@@ -72,5 +72,10 @@ WORKS: dict[str, Work[PapersStudio]] = {
     "uploads": Work("what a frame sends", papers_plane.uploads, ("volume", "points", "mesh")),
     "alpha": Work("what approximations lose", papers_volume.alpha, VOLUMES[:3]),
     "focal-plane": Work("distance of the focal plane", papers_volume.focal_plane, ("8 views",)),
+    "focal-plane-quads": Work(
+        "distance of the focal plane, covering quads",
+        papers_quads.focal_plane,
+        (papers_quads.TRIANGLES, papers_quads.SURFELS),
+    ),
     "2007a-table2": Work("2007a Table 2: volumes, 1900×1200, 8 views", papers_volume.table_1900, VOLUMES),
 }
