@@ -358,7 +358,7 @@ def test_a_byte_order_mark_is_no_harm(tmp_path: Path) -> None:
 
 def test_paths_that_lead_nowhere(tmp_path: Path) -> None:
     for path in (tmp_path / "none.json", tmp_path, "a\0b"):
-        with pytest.raises(aus.FileError, match="cannot be read"):
+        with pytest.raises(aus.FileError, match=r"cannot be read|the system refuses"):
             Display.from_calibration(path)
     with pytest.raises(aus.InputError, match="expected a path or a dict, got int"):
         Display.from_calibration(3)  # type: ignore[arg-type]

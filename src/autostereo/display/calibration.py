@@ -20,12 +20,12 @@ import json
 import math
 import os
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
 
 from ..errors import FileError, InputError
+from ..image import as_path
 from ..viewmap import CELL_MODES, ViewMap
 from .masks import MAX_SIZE
 
@@ -132,14 +132,12 @@ def read_calibration(source: str | os.PathLike[str] | dict[str, Any]) -> Calibra
         return _Reader("calibration", InputError).calibration(source)
     if not isinstance(source, (str, os.PathLike)):
         raise InputError(f"calibration: expected a path or a dict, got {type(source).__name__}")
-    path = Path(source)
+    path = as_path(source)
     try:
         with open(path, "rb") as file:
             raw = file.read(MAX_BYTES + 1)
     except OSError as error:
         raise FileError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except ValueError as error:  # a NUL in the name
-        raise FileError(f"{str(path)!r}: cannot be read ({error})") from error
     if len(raw) > MAX_BYTES:
         raise FileError(f"{path}: expected a Looking Glass calibration, the file is larger than {MAX_BYTES} bytes")
     if not raw.strip():

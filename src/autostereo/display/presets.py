@@ -21,6 +21,7 @@ from typing import Any
 
 from ..checks import check_views
 from ..errors import AutostereoError, FileError, InputError
+from ..image import as_path
 from . import masks
 from .calibration import Calibration, read_calibration
 from .display import Display, looking_glass
@@ -110,11 +111,12 @@ def load_preset(name: str | os.PathLike[str]) -> Display:
 
 
 def _read(path: Path) -> bytes:
+    path = as_path(path)
     try:
         with open(path, "rb") as file:
             raw = file.read(MAX_BYTES + 1)
-    except (OSError, ValueError) as error:
-        raise FileError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read ({error.strerror or error})") from error
     if len(raw) > MAX_BYTES:
         raise FileError(f"{path}: expected a display as TOML, the file is larger than {MAX_BYTES} bytes")
     return raw
