@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -74,12 +73,9 @@ def render(
     scene = common.load_scene(inputs, background, volumes)
 
     from ..display.rig import Rig
-    from ..engines.cpu.kernels import kernels_for
     from ..render import render as draw
 
     rig = rig or Rig.frame(scene, where, side)
-    kept = replace(options, depth=where.layout == "rgbd")  # as Renderer does for displays of 2D + depth
-    common.announce_compilation(engine, *kernels_for(scene, where.viewmap, kept, method, rig.views))
     drawn = partial(draw, scene, where, rig, method=method, engine=engine)
     start = perf_counter()
     with common.working("rendering"):
