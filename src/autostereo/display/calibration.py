@@ -30,7 +30,6 @@ from ..viewmap import CELL_MODES, ViewMap
 from .masks import MAX_SIZE
 
 MAX_BYTES = 1 << 20
-CELLS_OF_MODE = (1, 2, 2, 4, 2)  # how many `viewmap.cell_index` tells apart
 CELL_FIELDS = ("ROffsetX", "ROffsetY", "GOffsetX", "GOffsetY", "BOffsetX", "BOffsetY")
 QUILT_FIELDS = ("tileX", "tileY", "quiltX", "quiltY", "quiltAspect")
 STRIPES = (((0.0, 0.0), (1 / 3, 0.0), (2 / 3, 0.0)),)
@@ -51,7 +50,7 @@ class Calibration:
     invert, flip_x, flip_y, flip_subpixels : bool
         invView, flipImageX, flipImageY, flipSubp.
     cell_mode : int
-        CellPatternMode 0…4 (`viewmap.cell_index`).
+        CellPatternMode 0…4 (`viewmap.cell_index`, then mod the number of cells).
     cells : tuple of cells, each ((dx, dy) of R, of G, of B) in pixels, y upwards
         Empty: RGB stripes.
     serial : str
@@ -213,9 +212,6 @@ class _Reader:
         mode = self.number(data, "CellPatternMode", 0, max(CELL_MODES), default=0.0)
         if mode != int(mode):
             self.fail("CellPatternMode", f"a whole number 0…{max(CELL_MODES)}", mode)
-        cells = self.cells(data)
-        if cells and len(cells) < CELLS_OF_MODE[int(mode)]:
-            self.fail("subpixelCells", f"{CELLS_OF_MODE[int(mode)]} cells for CellPatternMode {mode:g}", len(cells))
         return Calibration(
             width=self.whole(data, "screenW", MAX_SIZE),
             height=self.whole(data, "screenH", MAX_SIZE),
@@ -229,7 +225,7 @@ class _Reader:
             flip_y=self.flag(data, "flipImageY"),
             flip_subpixels=self.flag(data, "flipSubp"),
             cell_mode=int(mode),
-            cells=cells,
+            cells=self.cells(data),
             serial=serial,
             quilt=self.quilt(data),
         )
