@@ -67,8 +67,8 @@ def render(
     volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
     common.check_side(side, camera)
     rig = common.load_camera(camera)
-    ending = "_2x2" if where.layout == "leia-2x2" else ""  # by which its device knows it
-    path = outputs.check_image(output or Path(f"{common.stem(inputs[0])}_{common.slug(display)}{ending}.png"))
+    own = f"{common.stem(inputs[0])}_{common.slug(display)}{where.ending}.png"
+    path = outputs.check_image(output or Path(own))
     outputs.check_apart(path, *inputs)
     scene = common.load_scene(inputs, background, volumes)
 
@@ -84,6 +84,5 @@ def render(
     common.note_reuse(panel, drawn, options)
     with common.working("writing"):
         panel.save(path)
-    if not path.stem.endswith(ending):
-        note(f"{path}: its device wants a name that ends in {ending}, such as {path.stem}{ending}{path.suffix}")
+    outputs.note_ending(path, where.ending)
     say(f"{path}  {panel.width}×{panel.height}")

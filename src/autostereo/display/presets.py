@@ -49,11 +49,11 @@ MASKS: dict[str, Callable[..., Display]] = {
     "rgbd": Display.rgbd,
 }
 FIELDS = {
-    "title", "source", "note", "width", "height", "views", "reverse", "fov_y", "comfort", "serial",
+    "title", "source", "note", "width", "height", "views", "reverse", "fov_y", "comfort", "serial", "ending",
     "mask", "calibration", "quilt", "optics",
 }  # fmt: skip
 TABLES = {"mask", "calibration", "quilt", "optics"}
-TEXTS = {"title", "source", "note", "serial"}
+TEXTS = {"title", "source", "note", "serial", "ending"}
 EXPECTED = {
     "width": "the panel's columns of pixels",
     "height": "the panel's rows of pixels",
@@ -152,7 +152,7 @@ def _build(where: str, name: str, fields: dict[str, Any]) -> Display:
             display = _calibrated(name, fields, (width, height), quilt)
         else:
             display = _from_mask(fields, width, height)
-        changes: dict[str, Any] = {key: fields[key] for key in ("fov_y", "comfort", "note") if key in fields}
+        changes: dict[str, Any] = {key: fields[key] for key in ("fov_y", "comfort", "note", "ending") if key in fields}
         display = replace(display, name=name, source=fields["source"], quilt=quilt, **changes)
         display = _call("optics", display.physical, (), fields.get("optics", {}))
         return display.swapped() if masks.check_flag("reverse", fields.get("reverse", False)) else display
