@@ -10,6 +10,7 @@ import pytest
 
 import autostereo as aus
 from autostereo import Renderer
+from autostereo.memory import gigabytes
 from autostereo.scene.samples import surfel_cloud
 
 DOOR = importlib.import_module("autostereo.render")  # the module: the package gives the function of that name
@@ -94,3 +95,15 @@ def test_what_is_held_already_is_not_asked_for_again(monkeypatch: pytest.MonkeyP
         renderer.render_views(RIG, SIZE)
     renderer.render(TABLE, RIG, out=np.empty((SIZE[1], SIZE[0], 3), np.uint8))
     assert asked == [RIG.views * PICTURE, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("count", "text"),
+    [
+        (0, "0 GB"), (1, "0.000000001 GB"), (59_000_000, "0.059 GB"), (201_326_592, "0.201 GB"), (10**9, "1 GB"),
+        (9_996_000_000, "10 GB"), (12_340_000_000, "12.3 GB"), (100 * 10**9, "100 GB"), (4_398_046_511_104, "4398 GB"),
+        (10**18, "1000000000 GB"),
+    ],
+)  # fmt: skip
+def test_memory_is_said_without_exponents(count, text):
+    assert gigabytes(count) == text
