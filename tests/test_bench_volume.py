@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import autostereo as aus
 from autostereo.cli import bench
 from autostereo.cli.benchmarks import (
     harness,
@@ -225,6 +227,13 @@ def test_psnr_is_its_definition():
     b[0, 0, 0] = 255
     assert volume.psnr(a, b) == pytest.approx(10 * math.log10(60))
     assert volume.psnr(b, a) == volume.psnr(a, b)
+    assert volume.psnr(np.stack([a, a]), np.stack([a, b])) == pytest.approx(10 * math.log10(120))
+
+
+def test_there_is_one_psnr():
+    """Of pictures, of benchmarks and of the simulator."""
+    sources = [path.read_text(encoding="utf-8") for path in Path(aus.__file__).parent.rglob("*.py")]
+    assert sum("255.0**2" in source or "255**2" in source for source in sources) == 1
 
 
 def test_unlike_pixels_are_those_off_by_more_than_a_level():
