@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -64,3 +66,58 @@ def test_methods_are_listed_where_they_are():
         aus.render(icosphere(1), DISPLAY, method="plane-rasterizer", engine="cpu")
     with pytest.raises(aus.UnsupportedError, match=r"n-pass-subres, dibr$"):
         aus.render(icosphere(1), DISPLAY, method="magic", engine="cpu")
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [("a\0b", "null byte"), ("x" * 300, "too long"), ("a\ud800b", "surrogates")],
+    ids=["nul", "long", "surrogate"],
+)
+def test_names_that_the_system_refuses(tmp_path, monkeypatch, name, reason):
+    from autostereo.encoders import save
+    from autostereo.encoders.video import save_animation
+    from autostereo.simulator.machine import Machine
+
+    monkeypatch.chdir(tmp_path)
+    panel, views = aus.Panel(np.zeros((2, 2, 3), np.uint8)), aus.ViewStack(np.zeros((2, 2, 2, 4), np.uint8))
+    calls = {
+        "": (views.save, aus.Rig.load, aus.load), ".png": (panel.save, lambda path: save(panel, path), aus.load),
+        ".npz": (views.save, aus.load), ".gif": (lambda path: save_animation(path, views),),
+        ".json": (aus.Rig().save, aus.Rig.load, aus.Display.from_calibration, aus.Display.preset),
+        ".toml": (Machine.load, aus.Display.preset), ".obj": (aus.load,), ".mha": (aus.load,), ".nii.gz": (aus.load,),
+    }  # fmt: skip
+    for suffix, doors in calls.items():
+        for door in doors:
+            with pytest.raises(aus.FileError, match=f"expected the name of a file, which .*{reason}"):
+                door(name + suffix)
+    assert not list(tmp_path.iterdir())
+
+
+def test_names_as_long_as_they_may_be(tmp_path):
+    path = tmp_path / ("ä" * 125 + ".png")
+    assert aus.Panel(np.zeros((2, 2, 3), np.uint8)).save(path) == path
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_files_that_name_others_by_names_that_none_can_have(tmp_path):
+    wavefront = tmp_path / "a.obj"
+    wavefront.write_text(f"mtllib {'x' * 300}.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n")
+    with pytest.warns(UserWarning, match="does not exist"):
+        aus.load(wavefront)
+    meta = tmp_path / "a.mhd"
+    meta.write_text(f"NDims = 3\nDimSize = 2 2 2\nElementType = MET_UCHAR\nElementDataFile = {'x' * 300}.raw\n")
+    with pytest.raises(aus.FileError, match="which does not exist"):
+        aus.load(meta)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names are bytes on Linux only")
+def test_names_that_are_no_unicode(tmp_path):
+    """SimpleITK would end the process."""
+    pytest.importorskip("SimpleITK")
+    folder, file = tmp_path / "a\udcffb", tmp_path / "a\udcffb.mha"
+    folder.mkdir()
+    for path in (file, folder / "a.dcm"):
+        path.write_bytes(b"x")
+    for path in (file, folder):
+        with pytest.raises(aus.FileError, match="expected a name in UTF-8"):
+            aus.load(path)

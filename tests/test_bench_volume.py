@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import autostereo as aus
 from autostereo.cli import bench
 from autostereo.cli.benchmarks import (
     harness,
@@ -25,7 +26,6 @@ from autostereo.cli.benchmarks import (
 from autostereo.cli.benchmarks.suite import BenchOptions
 from autostereo.display.rig import Rig
 from autostereo.engines import engine as engines
-from autostereo.engines.cpu import jit
 from autostereo.errors import AutostereoError, DependencyError, InputError, UnsupportedError
 from autostereo.render import render_views
 from autostereo.scene.appearance import Material
@@ -60,13 +60,13 @@ class Clockwork:
     def prepare(self, scene):
         return scene
 
-    def beside(self, prepared, draw):
-        return 0
-
     def draw(self, prepared, draw, target):
         self.now += 1.0 + (len(draw.offsets) if draw.viewmap is None else 0)
         self.drawn.append((draw, target.color.shape))
         target.color[...] = self.level + (draw.options.volume == "exact")
+
+    def beside(self, prepared, draw):
+        return 0
 
     def merge_view(self, view, index, draw, out):
         pass
@@ -213,11 +213,8 @@ def test_report_prints_and_saves_every_benchmark(clockwork, tmp_path, capsys):
     assert "0 of 0 bars met" in printed  # quick: held to no bar
 
 
-@pytest.mark.parametrize("name", report.SUITES)
-def test_the_remark_on_compiling_looks_for_kernels_that_exist(name):
-    sources = [path.read_text() for path in Path(jit.__file__).parent.glob("*.py")]
-    for kernel in bench.KERNELS[name]:
-        assert any(f"\ndef {kernel}" in source for source in sources), kernel
+def test_the_verb_lists_every_benchmark():
+    assert set(bench.BENCHES) == set(report.SUITES)
 
 
 # --- small functions -------------------------------------------------------------------------------------------------
@@ -230,6 +227,13 @@ def test_psnr_is_its_definition():
     b[0, 0, 0] = 255
     assert volume.psnr(a, b) == pytest.approx(10 * math.log10(60))
     assert volume.psnr(b, a) == volume.psnr(a, b)
+    assert volume.psnr(np.stack([a, a]), np.stack([a, b])) == pytest.approx(10 * math.log10(120))
+
+
+def test_there_is_one_psnr():
+    """Of pictures, of benchmarks and of the simulator."""
+    sources = [path.read_text(encoding="utf-8") for path in Path(aus.__file__).parent.rglob("*.py")]
+    assert sum("255.0**2" in source or "255**2" in source for source in sources) == 1
 
 
 def test_unlike_pixels_are_those_off_by_more_than_a_level():

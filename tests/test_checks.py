@@ -157,3 +157,48 @@ def test_a_huge_triangle_is_cut_at_the_near_plane():
     mesh = aus.Mesh([(-1e15, -1e15, -1e15), (1e15, -1e15, 1e15), (0, 1e15, 1e15)], FACES)
     for engine in ("reference", "cpu"):
         assert aus.render_views(mesh, aus.Rig(views=2), (8, 8), engine=engine).views == 2
+
+
+def test_options_take_numbers_of_numpy_and_keep_plain_ones():
+    given = aus.Options(
+        step=np.float32(0.5), aperture=np.float64(0.25), samples=np.int64(4), depth=np.bool_(False),
+        small_size=[np.int64(3), 4], lens=np.array([2, 3]), views_per_pass=np.int64(2), groups=np.uint8(5),
+        references=np.int32(3), shading=np.str_("center"),
+    )  # fmt: skip
+    plain = aus.Options(
+        step=0.5, aperture=0.25, samples=4, depth=False, small_size=(3, 4), lens=(2, 3), views_per_pass=2, groups=5,
+        references=3, shading="center",
+    )  # fmt: skip
+    assert given == plain and hash(given) == hash(plain)
+    for name, value in vars(plain).items():
+        kept = getattr(given, name)
+        assert type(kept) is type(value), name
+        assert not isinstance(kept, tuple) or [type(number) for number in kept] == [int, int]
+    assert type(aus.Options(step=2).step) is float
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("step", True, "expected a number, got True"),
+        ("step", np.bool_(True), "expected a number, got"),
+        ("step", np.float32(0), "expected a number > 0 .*, got"),
+        ("step", np.inf, "expected a finite number, got inf"),
+        ("samples", True, "expected one of 1, 4, 16, 64, got True"),
+        ("samples", 4.0, "expected one of 1, 4, 16, 64, got 4.0"),
+        ("samples", np.array([4, 4]), "expected one of 1, 4, 16, 64, got array"),
+        ("depth", 1, "expected one of False, True, got 1"),
+        ("shading", ["exact"], "expected one of 'exact', 'center', 'reuse', got"),
+        ("lens", (True, 1), "expected two whole numbers from 1 to 64, got"),
+        ("lens", np.array([1.0, 2.0]), "expected two whole numbers from 1 to 64, got"),
+        ("lens", [np.int64(1), np.int64(65)], "expected two whole numbers from 1 to 64, got"),
+        ("small_size", np.array([4, 4, 4]), "expected two whole numbers ≥ 1, got"),
+        ("small_size", {4, 5}, "expected two whole numbers ≥ 1, got"),
+        ("views_per_pass", np.bool_(True), "expected a whole number ≥ 1, got"),
+        ("groups", np.int64(0), "expected a whole number ≥ 1, got"),
+        ("references", None, "expected a whole number ≥ 1, got None"),
+    ],
+)
+def test_options_refuse_what_only_looks_like_numbers(name, value, words):
+    with pytest.raises(aus.InputError, match=f"options {name}: {words}"):
+        aus.Options(**{name: value})

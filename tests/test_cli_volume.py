@@ -173,54 +173,6 @@ def test_mistakes_in_options_of_rays_are_one_line(
     assert result.status == 2 and words in result.err and result.err.count("\n") == 1
 
 
-def test_the_first_run_of_every_primitive_says_that_it_compiles(
-    cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from autostereo.engines.cpu import jit
-
-    asked: list[str] = []
-    monkeypatch.setattr(jit, "is_compiled", lambda *names: asked.extend(names) or False)
-    door = importlib.import_module("autostereo.render")
-
-    for name in ("render", "render_views"):
-        monkeypatch.setattr(door, name, lambda *_, **__: 1 / 0)
-    Path("points.xyz").write_text("0 0 0\n1 0 0\n0 1 0\n0 0 1\n")
-    panel, stack = ("render", "-d", "alioscopy-8"), ("views", "-o", "v")
-    for arguments, kernels in (
-        ((*panel, "a.raw", *RAW), ["draw_woven_rows-"]),
-        ((*stack, "a.raw", *RAW), ["draw_shared_rows-"]),
-        ((*stack, "a.raw", *RAW, "--volume", "exact"), ["draw_rows-"]),
-        ((*panel, "points.xyz"), ["splat_panel-"]),
-        ((*stack, "triangle.off", "points.xyz"), ["draw_views-", "splat_views-"]),
-        ((*panel, "a.raw", *RAW, "triangle.off"), ["draw_panel-", "draw_panel_rays-"]),
-        ((*panel, "points.xyz", "--method", "n-pass"), ["splat_views-"]),
-        ((*panel, "a.raw", *RAW, "--method", "n-pass"), ["draw_rows-"]),
-        ((*panel, "a.raw", *RAW, "--method", "dibr"), ["draw_rows-", "warp_rows-"]),
-        ((*panel, "a.raw", *RAW, "--iso", "50"), ["draw_panel_rays-"]),
-        ((*panel, "a.raw", *RAW, "--mode", "mip"), ["draw_panel_rays-"]),
-        ((*stack, "a.raw", *RAW, "--views", "1"), ["draw_rows-"]),
-        (("render", "-d", "philips-wowvx", "a.raw", *RAW), ["draw_rows-"]),
-    ):
-        asked.clear()
-        assert cli(*arguments).err.startswith("compiling kernels")
-        assert asked == kernels
-
-
-def test_names_of_kernels_are_those_of_the_engine() -> None:
-    from autostereo.engines.cpu import mesh_panel, mesh_views, points_panel, points_views, volume_panel, volume_views
-    from autostereo.engines.cpu.kernels import kernels_for
-    from autostereo.engines.options import Options
-    from autostereo.scene import samples
-
-    modules = (mesh_panel, mesh_views, points_panel, points_views, volume_panel, volume_views)
-    every = [samples.shells(16), samples.surfel_cloud(100), aus.Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [[0, 1, 2]])]
-    for scene in (aus.Scene(every), aus.Scene(every[:1])):
-        for display in (None, "alioscopy-8", "looking-glass-portrait", "lenticular-8"):
-            viewmap = None if display is None else aus.Display.preset(display).viewmap
-            for name in kernels_for(scene, viewmap, Options()):
-                assert any(hasattr(module, name.removesuffix("-")) for module in modules)
-
-
 def test_render_and_views_of_a_volume(cli: Run, folder: Path) -> None:
     render = cli("render", "a.raw", *RAW, "-d", "alioscopy-8", "--size", "48x30", "--engine", "reference")
     assert render.status == 0 and Path("a_alioscopy-8.png").exists(), render.err

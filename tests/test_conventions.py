@@ -98,6 +98,21 @@ def test_uint8_is_floor_of_255_v_plus_half(value: float) -> None:
     assert (stack.color[..., 3] == 255).all()
 
 
+def test_colours_in_arrays_may_be_integers_0_to_255_others_are_plain_numbers() -> None:
+    corners, red = [(0, 0, 0), (1, 0, 0), (0, 1, 0)], (255, 0, 1)
+    for thing in (aus.Mesh(corners, [(0, 1, 2)], colors=[red] * 3), aus.Points(corners, colors=[red] * 3)):
+        assert thing.colors is not None and np.allclose(thing.colors, [(1, 0, 1 / 255)] * 3)
+    assert aus.Scene(thing, background=(1, 0, 0)).background == (1.0, 0.0, 0.0)
+    assert np.array_equal(aus.TransferFunction([(0, 1, 0, 0, 1)]).points[0, 1:4], (1, 0, 0))
+    with pytest.raises(aus.InputError, match="background: expected values 0…1"):
+        aus.Scene(thing, background=red)
+    with pytest.raises(aus.InputError, match="expected colours 0…1"):
+        aus.TransferFunction([(0, *red, 1)])
+    assert aus.DirectionalLight((0, 0, -1), color=(255, -1, 1e6)).color == (255.0, -1.0, 1e6)
+    with pytest.raises(aus.InputError, match="light color: expected three numbers within"):
+        aus.DirectionalLight((0, 0, -1), color=(2e6, 0, 0))
+
+
 def test_rgb_is_over_the_background_and_alpha_is_opacity() -> None:
     scene = aus.Scene(square((0, 0, 0), 0.3, (1, 1, 1)), background=(1.0, 0.0, 0.2))
     color = aus.render_views(scene, RIG, SIZE, engine="reference").color

@@ -10,6 +10,7 @@ import pytest
 
 import autostereo as aus
 from autostereo import Renderer
+from autostereo.memory import gigabytes
 from autostereo.scene.samples import surfel_cloud
 from gl_device import need_device
 
@@ -116,3 +117,15 @@ def test_software_opengl_asks_for_its_textures(monkeypatch: pytest.MonkeyPatch) 
         renderer.render(TABLE, RIG, method="n-pass")
     views, panel = RIG.views * PICTURE, 3 * PICTURE // 4
     assert asked == [views + 2 * views, 0, panel + PICTURE, 0]
+
+
+@pytest.mark.parametrize(
+    ("count", "text"),
+    [
+        (0, "0 GB"), (1, "0.000000001 GB"), (59_000_000, "0.059 GB"), (201_326_592, "0.201 GB"), (10**9, "1 GB"),
+        (9_996_000_000, "10 GB"), (12_340_000_000, "12.3 GB"), (100 * 10**9, "100 GB"), (4_398_046_511_104, "4398 GB"),
+        (10**18, "1000000000 GB"),
+    ],
+)  # fmt: skip
+def test_memory_is_said_without_exponents(count, text):
+    assert gigabytes(count) == text

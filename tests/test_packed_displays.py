@@ -113,7 +113,34 @@ def test_the_command_line_names_leia_s_pictures(cli: Run, folder: Path) -> None:
     assert (result.status, files(folder)) == (0, {"square.off", "square_leia-4-view_2x2.png"})
     assert pixels("square_leia-4-view_2x2.png").shape == (32, 48, 3) and "wants a name" not in result.err
     assert "out.png: its device wants a name that ends in _2x2, such as out_2x2.png" in cli(*leia, "-o", "out.png").err
+    assert "p.png: its device wants a name that ends in _2x2" in cli("pattern", *leia[2:], "-o", "p.png").err
+    assert "wants a name" not in cli("pattern", *leia[2:], "-o", "p_2x2.png").err
     refused(cli("weave", "out.png", "--grid", "2x2", "-d", "leia-4-view", "-o", "p.png"), "is not woven from a quilt")
+
+
+def test_leia_s_side_by_side_pictures_end_in_2x1(cli: Run, folder: Path) -> None:
+    leia = ("-d", "leia-lume-pad-2", "--size", "48x32")
+    result = cli("render", "square.off", *leia)
+    assert (result.status, files(folder)) == (0, {"square.off", "square_leia-lume-pad-2_2x1.png"})
+    assert "wants a name" not in result.err
+    words = "out.png: its device wants a name that ends in _2x1, such as out_2x1.png"
+    assert words in cli("render", "square.off", *leia, "-o", "out.png").err
+    assert words in cli("pattern", *leia, "-o", "out.png").err
+    assert "wants a name" not in cli("render", "square.off", "-d", "side-by-side", "--size", "48x32").err
+
+
+def test_the_ending_of_names_is_a_field_of_display_files(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    text = 'source = "me"\nwidth = 48\nheight = 32\n{}[mask]\nkind = "stereo"\nlayout = "{}"\n'
+    for ending, layout, expected in (
+        ("", "side-by-side", ""), ("", "leia-2x2", "_2x2"), ('ending = "_x"\n', "leia-2x2", "_x"),
+        ('ending = "_x"\n', "checkerboard", "_x"),
+    ):  # fmt: skip
+        path.write_text(text.format(ending, layout))
+        assert aus.Display.preset(path).ending == aus.Display.preset(path).swapped().ending == expected
+    path.write_text(text.format("ending = 3\n", "side-by-side"))
+    with pytest.raises(aus.FileError, match="ending: expected a string, found 3"):
+        aus.Display.preset(path)
 
 
 def test_the_command_line_packs_frames(cli: Run, folder: Path) -> None:

@@ -276,6 +276,6 @@ def test_small_views_are_of_the_size_asked_for(engine):
     assert np.ptp(panel(small_size=(1, 1))) <= np.ptp(panel(small_size=(6, 5)))
     with pytest.raises(InputError, match="small_size: expected at most the panel's 24×20, got 25×1"):
         panel(small_size=(25, 1))
-    for wrong in ((0, 4), (4,), [4, 4], (4, 4.0), 4, (True, 4)):
+    for wrong in ((0, 4), (4,), [4, 0], (4, 4.0), 4, (True, 4)):
         with pytest.raises(InputError, match="small_size: expected two whole numbers ≥ 1"):
             Options(small_size=wrong)

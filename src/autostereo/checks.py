@@ -69,10 +69,29 @@ def check_direction(name: str, value: object) -> Vector:
 
 def check_views(value: object, name: str = "views") -> int:
     """Return a number of views 1…MAX_VIEWS, or raise InputError."""
-    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-    if not whole or not 1 <= value <= MAX_VIEWS:  # type: ignore[operator]
-        raise InputError(f"{name}: expected a whole number 1…{MAX_VIEWS}, got {shown(value)}")
+    return check_count(name, value, MAX_VIEWS)
+
+
+def check_count(name: str, value: object, high: int | None = None) -> int:
+    """Return a whole number ≥ 1, and ≤ high if there is one, as an int, or raise InputError."""
+    if not _is_count(value, high):
+        wanted = "≥ 1" if high is None else f"1…{high}"
+        raise InputError(f"{name}: expected a whole number {wanted}, got {shown(value)}")
     return int(value)  # type: ignore[call-overload]
+
+
+def check_counts(name: str, value: object, high: int | None = None) -> tuple[int, int]:
+    """Return two such numbers, of a tuple, a list or an array, or raise InputError."""
+    pair = value.tolist() if isinstance(value, np.ndarray) else value
+    if not isinstance(pair, (tuple, list)) or len(pair) != 2 or not all(_is_count(number, high) for number in pair):
+        wanted = "≥ 1" if high is None else f"from 1 to {high}"
+        raise InputError(f"{name}: expected two whole numbers {wanted}, got {shown(value)}")
+    return (int(pair[0]), int(pair[1]))
+
+
+def _is_count(value: object, high: int | None) -> bool:
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    return whole and 1 <= value and (high is None or value <= high)  # type: ignore[operator]
 
 
 def real_array(name: str, value: object, expected: str = "an array of numbers") -> NDArray[Any]:

@@ -107,7 +107,8 @@ class ViewStack:
         """
         if not isinstance(exact, ViewStack) or exact.color.shape != self.color.shape:
             raise InputError(f"exact: expected {self.views} views of {self.width}×{self.height}, got {_what(exact)}")
-        return _decibels([_difference(a[..., :3], b[..., :3]) for a, b in zip(self.color, exact.color, strict=True)])
+        errors = [squared_error(a[..., :3], b[..., :3]) for a, b in zip(self.color, exact.color, strict=True)]
+        return decibels(float(np.mean(errors)))
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write `path`.npz (arrays `color`, `depth`), or a folder of view_000.png, view_001.png, …
@@ -163,23 +164,22 @@ class Panel:
         """Peak signal-to-noise ratio in dB against another panel; see `ViewStack.psnr`."""
         if not isinstance(exact, Panel) or exact.pixels.shape != self.pixels.shape:
             raise InputError(f"exact: expected a panel of {self.width}×{self.height}, got {_what(exact)}")
-        return _decibels([_difference(self.pixels, exact.pixels)])
+        return decibels(squared_error(self.pixels, exact.pixels))
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write an image file; png and webp are lossless, others blur neighbouring views into each other."""
         return write_image(path, self.pixels)
 
 
-def _difference(picture: NDArray[np.uint8], exact: NDArray[np.uint8]) -> float:
-    """Mean squared difference of two pictures, a row at a time: no copies of the size of a picture."""
-    rows = (np.square(a.astype(np.int32) - b).sum(dtype=np.int64) for a, b in zip(picture, exact, strict=True))
-    return float(sum(rows)) / picture.size
+def squared_error(picture: NDArray[np.uint8], exact: NDArray[np.uint8]) -> float:
+    """Mean squared difference of two pictures or stacks, a row or a view at a time: no copies of the size of all."""
+    parts = (np.square(a.astype(np.int32) - b).sum(dtype=np.int64) for a, b in zip(picture, exact, strict=True))
+    return float(sum(parts)) / picture.size
 
 
-def _decibels(differences: list[float]) -> float:
-    """Peak signal-to-noise ratio of the mean of these."""
-    mean = float(np.mean(differences))
-    return float("inf") if mean == 0 else float(10 * np.log10(255.0**2 / mean))
+def decibels(error: float) -> float:
+    """Peak signal-to-noise ratio of a mean squared difference; inf for none."""
+    return float("inf") if error == 0 else float(10 * np.log10(255.0**2 / error))
 
 
 def _what(picture: object) -> str:

@@ -11,6 +11,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from .checks import shown
 from .errors import FileError, InputError
 from .temporary import holding
 
@@ -18,11 +19,28 @@ IMAGE_SUFFIXES = (".png", ".webp", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 
 
 def as_path(path: object) -> Path:
-    """Return the name of a file as a Path, or raise InputError."""
+    """Return the name of a file, which need not exist, as a Path.
+
+    Raises
+    ------
+    InputError
+        It is of a type that names no file.
+    FileError
+        The system refuses the name: it is too long, has a NUL or half a surrogate pair, or leads where none may look.
+    """
     try:
-        return Path(path)  # type: ignore[arg-type]
+        name = Path(path)  # type: ignore[arg-type]
     except TypeError:
         raise InputError(f"path: expected the name of a file, got {type(path).__name__}") from None
+    try:
+        os.stat(name)
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or getattr(error, "reason", None) or error
+        expected = "expected the name of a file, which the system refuses"
+        raise FileError(f"{shown(str(name))}: {expected} ({reason})") from None
+    return name
 
 
 def write_atomic(path: str | os.PathLike[str], write: Callable[[BinaryIO], object]) -> Path:
@@ -40,7 +58,7 @@ def write_atomic(path: str | os.PathLike[str], write: Callable[[BinaryIO], objec
     if path.is_dir():
         raise FileError(f"{path}: expected a file name, found a folder")
     try:
-        with holding(folder / f".{path.name}.{secrets.token_hex(4)}.part") as temporary:
+        with holding(folder / f".{path.name[:32]}.{secrets.token_hex(4)}.part") as temporary:
             with open(temporary, "wb") as file:
                 write(file)
             os.replace(temporary, path)

@@ -2,6 +2,8 @@
 
 Numba's own cache does not notice an edit in a jitted callee of another file. Here the cache folder is keyed
 by the sources of the whole folder, so that kernels may live in several files and never go stale.
+
+Numba is imported when the first folder of kernels is: `telling` costs nothing where none is.
 """
 
 from __future__ import annotations
@@ -10,12 +12,40 @@ import hashlib
 import os
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import numba
-from numba import config, njit
+_waiting: list[Callable[[], object]] = []  # who is told when something is compiled
+
+
+@contextmanager
+def telling(tell: Callable[[], object]) -> Iterator[None]:
+    """Within the block, call `tell` when the first kernel is about to be compiled, not found in the cache."""
+    _waiting.append(tell)
+    try:
+        yield
+    finally:
+        if tell in _waiting:
+            _waiting.remove(tell)
+
+
+@lru_cache(maxsize=1)
+def _listen() -> None:
+    """Have Numba say when it compiles."""
+    from numba.core import event
+
+    class Listener(event.Listener):  # type: ignore[misc]
+        def on_start(self, event: Any) -> None:
+            while _waiting:
+                _waiting.pop()()
+
+        def on_end(self, event: Any) -> None:
+            pass
+
+    event.register("numba:compile", Listener())
 
 
 class Kernels:
@@ -29,6 +59,7 @@ class Kernels:
 
     def __init__(self, folder: Path) -> None:
         self.cache = _cache_folder(_key(folder))
+        _listen()
 
     def kernel(self, function: Callable[..., Any]) -> Callable[..., Any]:
         """Compile `function`: no GIL, cached, C-like division, never fastmath (kernels must agree bit for bit)."""
@@ -46,13 +77,9 @@ class Kernels:
         """Compile `function` without reference counting, as `inlined`, but as a function that is called."""
         return self._compile(function, _nrt=False)
 
-    def is_compiled(self, *names: str) -> bool:
-        """True when the cache holds the kernels whose names begin so: what uses them starts at once."""
-        if config.DISABLE_JIT:
-            return True
-        return self.cache is not None and all(any(self.cache.rglob(f"*.{name}*.nbc")) for name in names)
-
     def _compile(self, function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
+        from numba import config, njit
+
         before = config.CACHE_DIR
         try:
             config.CACHE_DIR = str(self.cache or "")
@@ -63,6 +90,8 @@ class Kernels:
 
 def _key(folder: Path) -> str:
     """Digest of the folder's sources, where they lie (Numba's cache asks), Numba's version and Python's."""
+    import numba
+
     digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:3]} {folder}".encode())
     for source in sorted(folder.glob("*.py")):
         digest.update(source.read_bytes())
@@ -71,6 +100,8 @@ def _key(folder: Path) -> str:
 
 def _cache_folder(key: str) -> Path | None:
     """First writable place for the cache: NUMBA_CACHE_DIR, the user's cache, the temporary folder; or None."""
+    from numba import config
+
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
     user = os.getuid() if hasattr(os, "getuid") else "user"
     for base in (config.CACHE_DIR, home / "autostereo", Path(tempfile.gettempdir()) / f"autostereo-{user}"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from typing import Any
 
@@ -25,7 +26,14 @@ def check_memory(need: int, what: str) -> None:
     """Raise MemoryLimitError when `need` bytes are more than the machine has free."""
     free = available_memory()
     if free is not None and need > 0.9 * free:
-        raise MemoryLimitError(f"{what} would take {need / 1e9:.3g} GB of memory, and {free / 1e9:.3g} GB are free")
+        raise MemoryLimitError(f"{what} would take {gigabytes(need)} of memory, and {gigabytes(free)} are free")
+
+
+def gigabytes(count: int) -> str:
+    """A number of bytes in GB: three digits that count, those before the point all, never an exponent."""
+    value = count / 1e9
+    text = f"{value:.{max(0, 2 - math.floor(math.log10(value)))}f}" if count else "0"
+    return f"{text.rstrip('0').rstrip('.') if '.' in text else text} GB"
 
 
 def available_memory() -> int | None:

@@ -14,6 +14,7 @@ import typer
 
 from .. import __version__
 from ..errors import AutostereoError, InputError
+from ..jit import telling
 from . import common
 from .bench import bench
 from .demo import demo
@@ -78,7 +79,7 @@ def run(arguments: Sequence[str]) -> int:
     try:
         if "" in arguments:  # Path takes it for the current folder
             raise InputError(f"argument {arguments.index('') + 1} is empty, expected a path or a value")
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), telling(common.note_compilation):
             warnings.showwarning = lambda message, *_, **__: common.note(f"autostereo: note: {message}")
             status = typer.main.get_command(app).main(args=arguments, prog_name="autostereo", standalone_mode=False)
         sys.stdout.flush()

@@ -184,16 +184,9 @@ def working(text: str, total: int | None = None) -> Iterator[Callable[[], None]]
         yield lambda: progress.advance(task)
 
 
-def announce_compilation(engine: str, *kernels: str) -> None:
-    """Say so when this is the run that compiles these kernels."""
-    from ..engines.engine import gpu_answers
-
-    if engine not in ("auto", "cpu") or (engine == "auto" and gpu_answers()):
-        return
-    from ..engines.cpu.jit import is_compiled
-
-    if not is_compiled(*kernels):
-        note("compiling kernels (once for each kind of picture, up to a minute)…")
+def note_compilation() -> None:
+    """Say that kernels are being compiled, when they are."""
+    note("compiling kernels (once for each kind of picture, up to a minute)…")
 
 
 def note_reuse(picture: Any, draw: Callable[..., Any], options: Options) -> None:

@@ -28,7 +28,6 @@ PORTRAIT = "looking-glass-portrait"
 WIDE = (1280, 720)
 TILE = (252, 336)  # of the quilt and the animation: large enough to look at, small enough to be quick
 EYES = {"left": (-31.5, 500.0), "right": (31.5, 500.0)}  # mm to the right and in front of the panel
-KERNELS = ("draw_views", "draw_panel", "draw_rows", "draw_shared_rows", "splat_views", "splat_panel")
 LENS = {"lens_pitch": 0.4266, "subpixel_pitch": 0.0805, "slant_deg": 12.0}  # about 5.4 sub-pixels a lens
 
 
@@ -59,7 +58,6 @@ def demo(
       autostereo demo -o /tmp/demo
     """
     with outputs.whole_folder(output) as folder:
-        common.announce_compilation("cpu", *KERNELS)
         from ..render import Renderer
 
         made: list[tuple[Show, Captions]] = []

@@ -91,6 +91,8 @@ def describe(display: Display) -> list[tuple[str, str]]:
     tile = "{}×{}".format(*display.comfort_size)
     lines.append(("comfort", f"{display.comfort:g} px between adjacent views of {tile} px"))
     lines.append(("source", display.source or "none given"))
+    if display.ending:
+        lines.append(("names end in", display.ending))
     if display.note:
         lines.append(("note", display.note))
     return lines

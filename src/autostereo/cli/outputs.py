@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ..errors import FileError, InputError
 from ..temporary import holding
+from .common import note
 
 
 def check_output(path: Path, suffixes: tuple[str, ...] = ()) -> Path:
@@ -46,6 +47,12 @@ def check_image(path: Path) -> Path:
     from ..image import IMAGE_SUFFIXES
 
     return check_output(path, IMAGE_SUFFIXES)
+
+
+def note_ending(path: Path, ending: str) -> None:
+    """Say so when the device would not know a picture by its name; see `Display.ending`."""
+    if not path.stem.endswith(ending):
+        note(f"{path}: its device wants a name that ends in {ending}, such as {path.stem}{ending}{path.suffix}")
 
 
 @contextmanager

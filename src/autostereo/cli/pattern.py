@@ -83,6 +83,7 @@ def pattern(
         for strip in sweep:
             say(strip.row)
     note(READ[kind])
+    outputs.note_ending(output, where.ending)
     say(f"{output}  {pixels.shape[1]}×{pixels.shape[0]}")
 
 

@@ -83,10 +83,8 @@ def quilt(
     if rig.aspect is None:
         rig = replace(rig, aspect=layout.aspect)
     from ..encoders.quilt import save_quilt
-    from ..engines.cpu.kernels import kernels_for
     from ..render import render_views
 
-    common.announce_compilation(engine, *kernels_for(scene, None, options, method, rig.views))
     drawn = partial(render_views, scene, rig, layout.tile, method=method, engine=engine)
     with common.working(f"rendering {rig.views} views"):
         stack = drawn(options=options)

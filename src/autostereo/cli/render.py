@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -68,18 +67,15 @@ def render(
     volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
     common.check_side(side, camera)
     rig = common.load_camera(camera)
-    ending = "_2x2" if where.layout == "leia-2x2" else ""  # by which its device knows it
-    path = outputs.check_image(output or Path(f"{common.stem(inputs[0])}_{common.slug(display)}{ending}.png"))
+    own = f"{common.stem(inputs[0])}_{common.slug(display)}{where.ending}.png"
+    path = outputs.check_image(output or Path(own))
     outputs.check_apart(path, *inputs)
     scene = common.load_scene(inputs, background, volumes)
 
     from ..display.rig import Rig
-    from ..engines.cpu.kernels import kernels_for
     from ..render import render as draw
 
     rig = rig or Rig.frame(scene, where, side)
-    kept = replace(options, depth=where.layout == "rgbd")  # as Renderer does for displays of 2D + depth
-    common.announce_compilation(engine, *kernels_for(scene, where.viewmap, kept, method, rig.views))
     drawn = partial(draw, scene, where, rig, method=method, engine=engine)
     start = perf_counter()
     with common.working("rendering"):
@@ -87,7 +83,6 @@ def render(
     note(f"rendered in {perf_counter() - start:.2f} s")
     with common.working("writing"):
         panel.save(path)
-    if not path.stem.endswith(ending):
-        note(f"{path}: its device wants a name that ends in {ending}, such as {path.stem}{ending}{path.suffix}")
+    outputs.note_ending(path, where.ending)
     say(f"{path}  {panel.width}×{panel.height}")
     common.note_reuse(panel, drawn, options)

@@ -89,13 +89,10 @@ def simulate(
     if picture is not None:
         outputs.check_image(picture)
     from ..simulator import output
-    from ..simulator.kernels.compiling import is_compiled
 
     if chart is not None:
         output.need_matplotlib()
     name, source, frames = _source(scene, max(counts), pixels, camera, side, every)
-    if not is_compiled("_shade_fragments", "rasterize"):
-        common.note("compiling kernels (once, about a minute)…")
     work: study.Study | study.FieldStudy
     if lens is not None:
         work = study.FieldStudy(source, machines, samples, aperture, counts, frames, pixels)

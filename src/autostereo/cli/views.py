@@ -98,10 +98,8 @@ def views(
     if lens is not None:
         options = replace(options, aperture=rig.focal / 50 if aperture is None else aperture, lens=samples_of_lens)
 
-    from ..engines.cpu.kernels import kernels_for
     from ..render import render_views
 
-    common.announce_compilation(engine, *kernels_for(scene, None, options, method, rig.views))
     drawn = partial(render_views, scene, rig, pixels, method=method, engine=engine)
     with common.working(f"rendering {rig.views} views"):
         stack = drawn(options=options)

@@ -81,7 +81,6 @@ def warp(
         assert taken.depth is not None
         rig = frame_depths(taken.depth[0], target, field)
     rig = replace(rig.with_views(target.views), fov_y=field, aspect=taken.width / taken.height)
-    common.announce_compilation("cpu", "warp_rows-")
     with common.working(f"warping to {rig.views} views"):
         stack = draw(taken, rig)
     if to_panel:
@@ -131,7 +130,6 @@ def write_panel(output: Path, stack: ViewStack, display: Display) -> None:
     from ..image import write_image
 
     assert display.viewmap is not None
-    common.announce_compilation("cpu", "_weave")
     panel, flips = (display.width, display.height), (display.flip_x, display.flip_y)
     with common.working("weaving"):
         grid = (stack.views, 1)

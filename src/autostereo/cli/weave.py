@@ -57,7 +57,6 @@ def weave(
         raise InputError(f"{where.name}: a {where.layout} picture is not woven from a quilt")
     outputs.check_image(output)
     outputs.check_apart(output, quilt)
-    common.announce_compilation("cpu", "_weave")
     pixels = common.load_picture(quilt, alpha=True)
     from ..engines.cpu.gather import weave as draw
     from ..image import write_image

@@ -20,17 +20,16 @@ import json
 import math
 import os
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
 
 from ..errors import FileError, InputError
+from ..image import as_path
 from ..viewmap import CELL_MODES, ViewMap
 from .masks import MAX_SIZE
 
 MAX_BYTES = 1 << 20
-CELLS_OF_MODE = (1, 2, 2, 4, 2)  # how many `viewmap.cell_index` tells apart
 CELL_FIELDS = ("ROffsetX", "ROffsetY", "GOffsetX", "GOffsetY", "BOffsetX", "BOffsetY")
 QUILT_FIELDS = ("tileX", "tileY", "quiltX", "quiltY", "quiltAspect")
 STRIPES = (((0.0, 0.0), (1 / 3, 0.0), (2 / 3, 0.0)),)
@@ -51,7 +50,7 @@ class Calibration:
     invert, flip_x, flip_y, flip_subpixels : bool
         invView, flipImageX, flipImageY, flipSubp.
     cell_mode : int
-        CellPatternMode 0…4 (`viewmap.cell_index`).
+        CellPatternMode 0…4 (`viewmap.cell_index`, then mod the number of cells).
     cells : tuple of cells, each ((dx, dy) of R, of G, of B) in pixels, y upwards
         Empty: RGB stripes.
     serial : str
@@ -132,14 +131,12 @@ def read_calibration(source: str | os.PathLike[str] | dict[str, Any]) -> Calibra
         return _Reader("calibration", InputError).calibration(source)
     if not isinstance(source, (str, os.PathLike)):
         raise InputError(f"calibration: expected a path or a dict, got {type(source).__name__}")
-    path = Path(source)
+    path = as_path(source)
     try:
         with open(path, "rb") as file:
             raw = file.read(MAX_BYTES + 1)
     except OSError as error:
         raise FileError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except ValueError as error:  # a NUL in the name
-        raise FileError(f"{str(path)!r}: cannot be read ({error})") from error
     if len(raw) > MAX_BYTES:
         raise FileError(f"{path}: expected a Looking Glass calibration, the file is larger than {MAX_BYTES} bytes")
     if not raw.strip():
@@ -215,9 +212,6 @@ class _Reader:
         mode = self.number(data, "CellPatternMode", 0, max(CELL_MODES), default=0.0)
         if mode != int(mode):
             self.fail("CellPatternMode", f"a whole number 0…{max(CELL_MODES)}", mode)
-        cells = self.cells(data)
-        if cells and len(cells) < CELLS_OF_MODE[int(mode)]:
-            self.fail("subpixelCells", f"{CELLS_OF_MODE[int(mode)]} cells for CellPatternMode {mode:g}", len(cells))
         return Calibration(
             width=self.whole(data, "screenW", MAX_SIZE),
             height=self.whole(data, "screenH", MAX_SIZE),
@@ -231,7 +225,7 @@ class _Reader:
             flip_y=self.flag(data, "flipImageY"),
             flip_subpixels=self.flag(data, "flipSubp"),
             cell_mode=int(mode),
-            cells=cells,
+            cells=self.cells(data),
             serial=serial,
             quilt=self.quilt(data),
         )

@@ -61,6 +61,8 @@ class Display:
         Where the numbers come from.
     note : str
         Conflicts and doubts about them.
+    ending : str
+        What the name of a picture's file ends in, before its suffix, by which the device knows it; "": anything.
     calibration : Calibration, optional
         The Looking Glass calibration behind the mask.
     """
@@ -81,6 +83,7 @@ class Display:
     distance_mm: float | None = None
     source: str = ""
     note: str = ""
+    ending: str = ""
     calibration: Calibration | None = None
 
     def __post_init__(self) -> None:
@@ -142,7 +145,7 @@ class Display:
 
     @property
     def picture_size(self) -> tuple[int, int]:
-        """Width and height in pixels of the picture the device takes; full side-by-side and top-bottom double it."""
+        """Width and height of the device's picture; of full side-by-side, top-bottom, frame packing more than a panel."""
         return self._packing.picture_size(self.width, self.height)
 
     @property
@@ -346,10 +349,7 @@ class Display:
 
     @staticmethod
     def rgbd(width: int, height: int, reverse: bool = False) -> Display:
-        """Picture and depth in one `width` × `height` frame, each at half width (displays.md 3.6).
-
-        `reverse` inverts the depth.
-        ."""
+        """Picture and depth, each half of `width` × `height` pixels (displays.md 3.6); `reverse` inverts the depth."""
         return _packed("rgbd", "rgbd", (width, height), reverse)
 
 
@@ -375,7 +375,8 @@ def _masked(name: str, size: tuple[Any, Any], viewmap: ViewMap, reverse: Any) ->
 def _packed(name: str, layout: str, size: tuple[Any, Any], reverse: Any) -> Display:
     packing = PACKED[layout]
     comfort = _two_view_comfort(size[0]) if packing.views == 2 else COMFORT
-    return Display(name, *size, layout=layout, eyes_swapped=reverse, cone_deg=packing.cone_deg, comfort=comfort)
+    known = {"cone_deg": packing.cone_deg, "comfort": comfort, "ending": packing.ending}
+    return Display(name, *size, layout=layout, eyes_swapped=reverse, **known)  # type: ignore[arg-type]
 
 
 def looking_glass(calibration: Calibration, viewmap: ViewMap, **fields: Any) -> Display:

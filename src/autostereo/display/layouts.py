@@ -31,6 +31,8 @@ class Packing:
         The only panel that has this layout.
     cone_deg : float
         Angle in which all views lie, where nothing else is known.
+    ending : str
+        See `Display.ending`.
     """
 
     views: int = 2
@@ -40,6 +42,7 @@ class Packing:
     gap: int = 0
     size: tuple[int, int] | None = None
     cone_deg: float = EYES_DEG
+    ending: str = ""
 
     def check(self, name: str, width: int, height: int) -> None:
         """Raise InputError unless a panel of that size can have this layout, called `name`."""
@@ -66,7 +69,7 @@ STEREO: dict[str, Packing] = {
     "top-bottom-half": Packing(down=2, shrink=(1, 2)),
     "frame-packing-720p": Packing(down=2, gap=30, size=(1280, 720)),
     "frame-packing-1080p": Packing(down=2, gap=45, size=(1920, 1080)),
-    "leia-2x2": Packing(views=4, across=2, down=2, shrink=(2, 2), cone_deg=CONE_DEG),
+    "leia-2x2": Packing(views=4, across=2, down=2, shrink=(2, 2), cone_deg=CONE_DEG, ending="_2x2"),
 }
 PACKED: dict[str, Packing] = {
     **STEREO,

@@ -21,6 +21,7 @@ from typing import Any
 
 from ..checks import check_views
 from ..errors import AutostereoError, FileError, InputError
+from ..image import as_path
 from . import masks
 from .calibration import Calibration, read_calibration
 from .display import Display, looking_glass
@@ -48,11 +49,11 @@ MASKS: dict[str, Callable[..., Display]] = {
     "rgbd": Display.rgbd,
 }
 FIELDS = {
-    "title", "source", "note", "width", "height", "views", "reverse", "fov_y", "comfort", "serial",
+    "title", "source", "note", "width", "height", "views", "reverse", "fov_y", "comfort", "serial", "ending",
     "mask", "calibration", "quilt", "optics",
 }  # fmt: skip
 TABLES = {"mask", "calibration", "quilt", "optics"}
-TEXTS = {"title", "source", "note", "serial"}
+TEXTS = {"title", "source", "note", "serial", "ending"}
 EXPECTED = {
     "width": "the panel's columns of pixels",
     "height": "the panel's rows of pixels",
@@ -110,11 +111,12 @@ def load_preset(name: str | os.PathLike[str]) -> Display:
 
 
 def _read(path: Path) -> bytes:
+    path = as_path(path)
     try:
         with open(path, "rb") as file:
             raw = file.read(MAX_BYTES + 1)
-    except (OSError, ValueError) as error:
-        raise FileError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read ({error.strerror or error})") from error
     if len(raw) > MAX_BYTES:
         raise FileError(f"{path}: expected a display as TOML, the file is larger than {MAX_BYTES} bytes")
     return raw
@@ -150,7 +152,7 @@ def _build(where: str, name: str, fields: dict[str, Any]) -> Display:
             display = _calibrated(name, fields, (width, height), quilt)
         else:
             display = _from_mask(fields, width, height)
-        changes: dict[str, Any] = {key: fields[key] for key in ("fov_y", "comfort", "note") if key in fields}
+        changes: dict[str, Any] = {key: fields[key] for key in ("fov_y", "comfort", "note", "ending") if key in fields}
         display = replace(display, name=name, source=fields["source"], quilt=quilt, **changes)
         display = _call("optics", display.physical, (), fields.get("optics", {}))
         return display.swapped() if masks.check_flag("reverse", fields.get("reverse", False)) else display

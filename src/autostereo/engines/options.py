@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..checks import FARTHEST, check_number
+import numpy as np
+
+from ..checks import FARTHEST, check_count, check_counts, check_number, shown
 from ..errors import InputError
 
 CHOICES: dict[str, tuple[object, ...]] = {
@@ -78,31 +80,29 @@ class Options:
     lens: tuple[int, int] = (4, 4)
 
     def __post_init__(self) -> None:
+        put = object.__setattr__
         for name, choices in CHOICES.items():
-            value = getattr(self, name)
-            if not any(value == c and type(value) is type(c) for c in choices):
-                wanted = ", ".join(repr(c) for c in choices)
-                raise InputError(f"options {name}: expected one of {wanted}, got {value!r}")
-        if isinstance(self.step, bool) or not isinstance(self.step, (int, float)) or not 0 < self.step < 1e6:
-            raise InputError(f"options step: expected a number > 0, got {self.step!r}")
-        check_number("options aperture", self.aperture, 0.0, FARTHEST)
-        lens = self.lens
-        whole = isinstance(lens, tuple) and len(lens) == 2 and all(type(n) is int and 1 <= n <= 64 for n in lens)
-        if not whole:
-            raise InputError(f"options lens: expected two whole numbers from 1 to 64, got {lens!r}")
-        small = self.small_size
-        if small is not None and not (isinstance(small, tuple) and len(small) == 2 and all(map(is_count, small))):
-            raise InputError(f"options small_size: expected two whole numbers ≥ 1, got {small!r}")
+            put(self, name, _choice(name, getattr(self, name), choices))
+        step = check_number("options step", self.step)
+        if not 0 < step < 1e6:
+            raise InputError(f"options step: expected a number > 0 (and < 1e6), got {self.step!r}")
+        put(self, "step", step)
+        put(self, "aperture", check_number("options aperture", self.aperture, 0.0, FARTHEST))
+        put(self, "lens", check_counts("options lens", self.lens, 64))
+        if self.small_size is not None:
+            put(self, "small_size", check_counts("options small_size", self.small_size))
         if self.aperture and self.depth:
             raise InputError("options depth: means through a lens of some aperture have no one depth")
         for name in ("views_per_pass", "groups", "references"):
-            value = getattr(self, name)
-            if name == "views_per_pass" and value is None:
-                continue
-            if not is_count(value):
-                raise InputError(f"options {name}: expected a whole number ≥ 1, got {value!r}")
+            if name != "views_per_pass" or self.views_per_pass is not None:
+                put(self, name, check_count(f"options {name}", getattr(self, name)))
 
 
-def is_count(value: object) -> bool:
-    """Whether it is a whole number ≥ 1."""
-    return type(value) is int and value >= 1
+def _choice(name: str, value: object, choices: tuple[object, ...]) -> object:
+    """Return the choice that a value is, whichever type of NumPy's it has, or raise InputError."""
+    kinds = {bool: (bool, np.bool_), int: (int, np.integer), str: (str,)}
+    for choice in choices:
+        flag_for_number = isinstance(value, bool) and not isinstance(choice, bool)
+        if isinstance(value, kinds[type(choice)]) and not flag_for_number and value == choice:
+            return choice
+    raise InputError(f"options {name}: expected one of {', '.join(map(repr, choices))}, got {shown(value)}")

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FileError, InputError
+from ..image import as_path
 from ..scene.scene import Scene, SceneObject
 from .dicom import load_dicom, load_folder
 from .files import PathLike
@@ -101,7 +102,7 @@ def load(
             raise InputError(f"load: expected a path, got {type(path).__name__}")
         if path == "":  # which Path takes for the current folder
             raise InputError("load: expected a path, got an empty text")
-        path = Path(path)
+        path = as_path(path)
         try:
             with np.errstate(all="ignore"):  # broken numbers are found by the checks of the objects
                 objects += _read(path, hints)

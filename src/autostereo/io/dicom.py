@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..errors import FileError
 from ..scene.volume import Volume
 from .files import PathLike, check_start
-from .volume import NO_HINTS, Hints, clean, make_volume, silenced, simpleitk
+from .volume import NO_HINTS, Hints, check_unicode, clean, make_volume, silenced, simpleitk
 
 PICTURES = (".tif", ".tiff", ".png")
 NATIVE = ("1.2.840.10008.1.2", "1.2.840.10008.1.2.1", "1.2.840.10008.1.2.2")  # transfer syntaxes that do not compress
@@ -62,6 +62,8 @@ def load_folder(path: PathLike, hints: Hints = NO_HINTS) -> list[Volume]:
     with silenced(sitk):
         find = sitk.ImageSeriesReader
         series = {name: find.GetGDCMSeriesFileNames(str(path), name) for name in find.GetGDCMSeriesIDs(str(path))}
+    for file in (file for files in series.values() for file in files):
+        check_unicode(file)
     known = {Path(file).name for files in series.values() for file in files}
     lost = _left_out(path, known)
     if not series:

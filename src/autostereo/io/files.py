@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError
+from ..image import as_path
 
 PathLike = str | os.PathLike[str]
 
@@ -31,7 +32,7 @@ def read_bytes(path: PathLike, asked_by: PathLike | None = None, limit: int = -1
     FileError
         The file is missing, a folder, unreadable, empty, or an HTML page or a Git LFS pointer in place of the data.
     """
-    path = Path(path)
+    path = as_path(path) if asked_by is None else Path(path)
     name = f"{path}" if asked_by is None else f"{asked_by}: needs {path}, which"
     try:
         if path.is_dir():

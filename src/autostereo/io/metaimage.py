@@ -7,6 +7,7 @@ Fields are those of the MetaIO documentation: https://itk.org/Wiki/ITK/MetaIO/Do
 from __future__ import annotations
 
 import math
+import os
 import re
 import shutil
 import zlib
@@ -46,8 +47,9 @@ def checked_metaimage(path: Path) -> Iterator[Path]:
     part = wanted // len(files)
     length = 0
     for file in files:
-        if not file.is_file():
-            raise FileError(f"{path}: needs {file}, which " + ("is a folder" if file.is_dir() else "does not exist"))
+        if not os.path.isfile(file):  # so for names that none can have
+            state = "is a folder" if os.path.isdir(file) else "does not exist"
+            raise FileError(f"{path}: needs {file}, which {state}")
         length, found = _unpack(path, file, start) if packed else (0, file.stat().st_size - start)
         if binary and (found < part or (packed and found > part)):
             sizes = f"{part:,} bytes of voxels expected, found {found:,}"

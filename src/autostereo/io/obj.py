@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -249,10 +250,10 @@ def _libraries(text: _Text, path: PathLike) -> dict[bytes, _Surface]:
     folder, libraries = Path(path).parent, 0
     for line in text.libraries:
         # one name that may hold blanks, or several names
-        names = [line] if (folder / line.decode("utf-8", "replace")).is_file() else line.split()
+        names = [line] if os.path.isfile(folder / line.decode("utf-8", "replace")) else line.split()
         for name in names:
             library = folder / name.decode("utf-8", "replace").replace("\\", "/")
-            if library.exists():
+            if os.path.exists(library):  # False for names that none can have
                 surfaces.update(_read_mtl(library))
                 libraries += 1
             elif text.used:

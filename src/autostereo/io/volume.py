@@ -116,12 +116,21 @@ def make_volume(values: NDArray, hints: Hints, spacing: Any = (1.0, 1.0, 1.0), *
 
 
 def simpleitk(path: PathLike) -> Any:
-    """Return SimpleITK, or say how to install it."""
+    """Return SimpleITK to read `path` with, or say how to install it."""
+    check_unicode(path)
     try:
         import SimpleITK
     except ImportError:
         raise DependencyError(f"{path}: needs SimpleITK: pip install autostereo[volumes]") from None
     return SimpleITK
+
+
+def check_unicode(path: PathLike) -> None:
+    """Raise a FileError for a name that is no Unicode: SimpleITK ends the process over it."""
+    try:
+        os.fspath(path).encode()
+    except UnicodeEncodeError:
+        raise FileError(f"{str(path)!r}: expected a name in UTF-8, as SimpleITK does; rename the file") from None
 
 
 @contextmanager

@@ -6,10 +6,10 @@ import os
 import sys
 from dataclasses import dataclass, field, fields, replace
 from importlib import resources
-from pathlib import Path
 from typing import Any
 
 from ..errors import FileError, InputError
+from ..image import as_path
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -252,7 +252,7 @@ class Machine:
             if name not in Machine.names():
                 raise InputError(f"machine: expected one of {', '.join(Machine.names())} or a .toml file, got {name!r}")
             return _parsed(folder.joinpath(f"{name}.toml").read_text(encoding="utf-8"), name)
-        path = Path(name)
+        path = as_path(name)
         try:
             if path.stat().st_size > MAX_BYTES:
                 raise FileError(f"{path}: expected a machine of at most {MAX_BYTES} bytes")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..frame import decibels, squared_error
 
 COUNTERS = {  # name: what people read
     "texels": "texels read by shaders",
@@ -107,11 +108,8 @@ class Report:
         """Peak signal-to-noise ratio in dB of each view's RGB (V,) against another report's; inf where equal."""
         if self.color.shape != exact.color.shape:
             raise InputError(f"psnr: expected pictures of one shape, got {self.color.shape} and {exact.color.shape}")
-        result = np.empty(len(self.color))
-        for v, (mine, other) in enumerate(zip(self.color, exact.color, strict=True)):
-            error = np.square(mine[..., :3].astype(np.float32) - other[..., :3]).mean(dtype=np.float64)
-            result[v] = np.inf if error == 0 else 10 * np.log10(255.0**2 / error)
-        return result
+        pairs = zip(self.color, exact.color, strict=True)
+        return np.array([decibels(squared_error(mine[..., :3], other[..., :3])) for mine, other in pairs])
 
     def as_dict(self) -> dict[str, Any]:
         """All numbers, for JSON."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...engines.options import Options
+from ...frame import decibels, squared_error
 from ...scene.scene import Scene
 from . import workloads
 from .contenders import NPASS, OURS, VTK, Studio, coverage, peer
@@ -239,9 +239,8 @@ def _memory(studio: VolumeStudio, name: str, lighting: str) -> list[Figure]:
 
 
 def psnr(picture: NDArray[np.uint8], other: NDArray[np.uint8]) -> float:
-    """Peak signal-to-noise ratio of two pictures in dB: 10·log10(255² / mean squared difference), at most 100."""
-    squared = float(np.mean((picture.astype(np.float64) - other) ** 2))
-    return min(100.0, 10 * math.log10(255**2 / squared)) if squared > 0 else 100.0
+    """Peak signal-to-noise ratio of two pictures or stacks in dB, at most 100: JSON has no infinity."""
+    return min(100.0, decibels(squared_error(picture, other)))
 
 
 def _work(title: str, figures: Callable[[VolumeStudio, str, str], list[Figure]], *scenes: str) -> Work[VolumeStudio]:

@@ -9,4 +9,4 @@ from . import simd_compiled  # noqa: F401  (kernels may use the vectors of `simd
 
 _kernels = Kernels(Path(__file__).parent)
 CACHE = _kernels.cache
-kernel, inlined, lean, is_compiled = _kernels.kernel, _kernels.inlined, _kernels.lean, _kernels.is_compiled
+kernel, inlined, lean = _kernels.kernel, _kernels.inlined, _kernels.lean

@@ -10,4 +10,4 @@ from pathlib import Path
 from ...jit import Kernels
 
 _kernels = Kernels(Path(__file__).parent)
-kernel, inlined, is_compiled = _kernels.lean, _kernels.inlined, _kernels.is_compiled
+kernel, inlined = _kernels.lean, _kernels.inlined
