@@ -145,7 +145,7 @@ class Display:
 
     @property
     def picture_size(self) -> tuple[int, int]:
-        """Width and height of the device's picture: more than a panel's where views lie side by side or above each other."""
+        """Width and height of the device's picture: more than a panel's where views lie beside or above each other."""
         return self._packing.picture_size(self.width, self.height)
 
     @property
