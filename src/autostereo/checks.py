@@ -51,7 +51,7 @@ def check_number(name: str, value: object, low: float = -np.inf, high: float = n
 
 def check_vector(name: str, value: object, high: float = LARGEST) -> Vector:
     """Return three numbers within ±high as a tuple, or raise InputError."""
-    v = real_array(name, value, "three numbers").astype(np.float64)
+    v = plain_numbers(name, value, "three numbers").astype(np.float64)
     if v.shape != (3,) or not np.isfinite(v).all():
         raise InputError(f"{name}: expected three finite numbers, got {shown(value)}")
     if np.abs(v).max() > high:
@@ -87,11 +87,22 @@ def real_array(name: str, value: object, expected: str = "an array of numbers") 
         array = np.asarray(value)
         if array.dtype.kind == "O" and all(isinstance(item, numbers.Real) for item in array.flat):
             array = array.astype(np.float64)  # whole numbers of more than 64 bits, fractions
-    except (TypeError, ValueError, OverflowError):
+    except OverflowError:
+        raise InputError(f"{name}: expected {expected} within ±{LARGEST:g}, got {shown(value)}") from None
+    except (TypeError, ValueError):
         raise InputError(f"{name}: expected {expected}, got {type(value).__name__} of uneven rows") from None
     if array.dtype.kind == "O" or array.dtype.kind not in "biuf":
         found = KINDS.get(array.dtype.kind) if isinstance(value, (np.ndarray, list, tuple)) else None
         raise InputError(f"{name}: expected {expected}, got {found or type(value).__name__}")
+    return array
+
+
+def plain_numbers(name: str, value: object, expected: str = "numbers") -> NDArray[Any]:
+    """`real_array` without booleans, which `check_number` refuses too, alone or among numbers."""
+    array = real_array(name, value, expected)
+    mixed = isinstance(value, (list, tuple)) and any(isinstance(item, (bool, np.bool_)) for item in value)
+    if array.dtype.kind == "b" or mixed:
+        raise InputError(f"{name}: expected {expected}, got {shown(value)}")
     return array
 
 
