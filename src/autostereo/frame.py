@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from .checks import check_unmasked
 from .errors import FileError, InputError
 from .image import as_path, write_atomic, write_image
 from .memory import check_memory
@@ -33,6 +34,8 @@ class ViewStack:
     reused: float | None = None
 
     def __post_init__(self) -> None:
+        check_unmasked("color", self.color, "pixels")
+        check_unmasked("depth", self.depth, "depths")
         color = np.asarray(self.color)
         if color.ndim != 4 or color.shape[3] != 4 or color.dtype != np.uint8 or 0 in color.shape:
             raise InputError(f"color: expected (V, H, W, 4) uint8, got {color.shape} {color.dtype}")
@@ -81,6 +84,7 @@ class ViewStack:
 
         The used part of the picture is C·⌊W'/C⌋ × R·⌊H'/R⌋ pixels, counted from the bottom left (displays.md 3.1).
         """
+        check_unmasked("quilt", quilt, "pixels")
         quilt = np.asarray(quilt)
         if quilt.ndim != 3 or quilt.shape[2] not in (3, 4) or quilt.dtype != np.uint8:
             raise InputError(f"quilt: expected (H, W, 3 or 4) uint8, got {quilt.shape} {quilt.dtype}")
@@ -145,6 +149,7 @@ class Panel:
     reused: float | None = None
 
     def __post_init__(self) -> None:
+        check_unmasked("pixels", self.pixels, "pixels")
         pixels = np.asarray(self.pixels)
         if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.dtype != np.uint8 or 0 in pixels.shape:
             raise InputError(f"pixels: expected (H, W, 3) uint8, got {pixels.shape} {pixels.dtype}")

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import FOV_RANGE, check_number, check_views
+from ..checks import FOV_RANGE, check_choice, check_number, check_pair, check_views
 from ..errors import InputError, UnsupportedError
 from ..viewmap import ViewMap
 from . import masks
@@ -87,8 +87,7 @@ class Display:
         put = object.__setattr__
         put(self, "width", check_size("width", self.width))
         put(self, "height", check_size("height", self.height))
-        if self.layout not in LAYOUTS:
-            raise InputError(f"layout: expected one of {', '.join(LAYOUTS)}, got {self.layout!r}")
+        check_choice("layout", self.layout, LAYOUTS)
         if (self.layout == "interlaced") != (self.viewmap is not None):
             problem = "a view map is missing" if self.viewmap is None else "takes no view map"
             raise InputError(f"layout {self.layout}: {problem}")
@@ -332,9 +331,7 @@ class Display:
         is four views of half the panel's size, the two left ones above. "row-interleaved", "column-interleaved" and
         "checkerboard" are masks.
         """
-        if layout not in STEREO_LAYOUTS:
-            raise InputError(f"layout: expected one of {', '.join(STEREO_LAYOUTS)}, got {layout!r}")
-        if layout in masks.TWO_VIEW_TABLES:
+        if check_choice("layout", layout, STEREO_LAYOUTS) in masks.TWO_VIEW_TABLES:
             display = _masked(layout, (width, height), masks.two_view(layout), reverse)
             return replace(display, cone_deg=EYES_DEG, comfort=_two_view_comfort(width))
         return _packed(layout, layout, (width, height), reverse)
@@ -354,9 +351,8 @@ class Display:
 
 
 def _pair_mm(value: Any) -> tuple[float, float]:
-    if isinstance(value, (str, bytes)) or not isinstance(value, (Sequence, np.ndarray)) or len(value) != 2:
-        raise InputError(f"size_mm: expected (width, height) in millimetres, got {value!r}")
-    return (check_number("size_mm width", value[0], 1e-3, 1e9), check_number("size_mm height", value[1], 1e-3, 1e9))
+    width, height = check_pair("size_mm", value, "(width, height) in millimetres")
+    return (check_number("size_mm width", width, 1e-3, 1e9), check_number("size_mm height", height, 1e-3, 1e9))
 
 
 def _two_view_comfort(width: Any) -> float:

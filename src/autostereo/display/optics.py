@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import check_number
+from ..checks import check_number, check_pair
 from ..errors import InputError, UnsupportedError
 from .display import Display
 
@@ -57,10 +57,8 @@ def wanted_phase(
 
 def zone_coordinate(display: Display, eye: Any) -> NDArray[np.float64]:
     """Zone coordinate f (W, 3) that an eye at (X, Z) mm selects, 0…1 in the central cone (DESIGN section 5)."""
-    if isinstance(eye, (str, bytes)) or not isinstance(eye, (Sequence, np.ndarray)) or len(eye) != 2:
-        raise InputError(f"eye: expected (x, z) in mm, got {eye!r}")
-    x_eye = check_number("eye x", eye[0], -1e9, 1e9)
-    z_eye = check_number("eye z", eye[1], 1e-3, 1e9)
+    x, z = check_pair("eye", eye, "(x, z) in mm")
+    x_eye, z_eye = check_number("eye x", x, -1e9, 1e9), check_number("eye z", z, 1e-3, 1e9)
     slope = (x_eye - column_mm(display)) / z_eye
     if display.distance_mm is not None:
         slope = slope + column_mm(display) / display.distance_mm

@@ -18,6 +18,7 @@ from ..checks import (
     FOV_RANGE,
     SMALLEST,
     Vector,
+    check_choice,
     check_direction,
     check_number,
     check_reach,
@@ -94,8 +95,7 @@ class Rig:
         if self.aspect is not None:
             put(self, "aspect", check_number("rig aspect", self.aspect, *ASPECT_RANGE))
         put(self, "views", check_views(self.views, "rig views"))
-        if self.spacing not in SPACINGS:
-            raise InputError(f"rig spacing: expected one of {', '.join(SPACINGS)}, got {self.spacing!r}")
+        check_choice("rig spacing", self.spacing, SPACINGS)
         if self.offsets is not None:
             self._check_offsets()
 

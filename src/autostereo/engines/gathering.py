@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import check_choice
 from ..errors import InputError
 from ..viewmap import ViewMap
 
@@ -51,8 +52,7 @@ def quilt_tiles(
         raise InputError(f"quilt: {columns}×{rows} tiles cannot hold the {viewmap.views} views of the display")
     if width < 1 or height < 1:
         raise InputError(f"size: expected a panel of at least 1×1 pixels, got {width}×{height}")
-    if filter not in FILTERS:
-        raise InputError(f"filter: expected one of {', '.join(FILTERS)}, got {filter!r}")
+    check_choice("filter", filter, FILTERS)
     return Tiles(
         columns, quilt.shape[1] // columns, quilt.shape[0] // rows, quilt.shape[1], quilt.shape[0], quilt.shape[2]
     )

@@ -9,6 +9,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from ..checks import check_choice
 from ..errors import FileError, InputError
 
 if sys.version_info >= (3, 11):
@@ -31,8 +32,7 @@ def _whole(name: str, value: object, low: int, high: int) -> None:
 
 
 def _one_of(name: str, value: object, names: tuple[str, ...]) -> None:
-    if value not in names:
-        raise InputError(f"machine {name}: expected one of {', '.join(names)}, got {value!r}")
+    check_choice(f"machine {name}", value, names)
 
 
 def _flag(name: str, value: object) -> None:
