@@ -212,9 +212,11 @@ def _vary_mask(display: Display, kind: str, change: float) -> tuple[ViewMap, str
     assert viewmap.offsets is not None
     viewmap = replace(viewmap, offsets=viewmap.offsets + shift)
     slant = math.atan2(-b, a) if a > 0 else math.atan2(b, -a)
-    pitch = 3 / abs(a) * math.cos(slant) if a else math.inf
+    unit = display.subpixel_pitch
+    pitch = 3 / math.hypot(a, b) * unit if a or b else math.inf
     phase = float((base.offsets[0, 0] + shift) % 1.0)
-    return viewmap, f"lens_pitch {pitch:.6g} sub-pixels, slant_deg {math.degrees(slant):.6g}, phase {phase:.5f}"
+    numbers = f"slant_deg {math.degrees(slant):.6g}, phase {phase:.5f}"
+    return viewmap, f"lens_pitch {pitch:.6g}, subpixel_pitch {unit:.12g}, {numbers}"
 
 
 def _vary_calibration(display: Display, kind: str, change: float) -> tuple[ViewMap, str]:

@@ -63,6 +63,8 @@ class Display:
         Conflicts and doubts about them.
     calibration : Calibration, optional
         The Looking Glass calibration behind the mask.
+    subpixel_pitch : float
+        Width of a sub-pixel in the unit that the lenses of `slanted` were given in; masks do not depend on it.
     """
 
     name: str
@@ -82,6 +84,7 @@ class Display:
     source: str = ""
     note: str = ""
     calibration: Calibration | None = None
+    subpixel_pitch: float = 1.0
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -103,6 +106,7 @@ class Display:
             put(self, "size_mm", _pair_mm(self.size_mm))
         if self.distance_mm is not None:
             put(self, "distance_mm", check_number("distance_mm", self.distance_mm, 1e-3, 1e9))
+        put(self, "subpixel_pitch", check_number("subpixel_pitch", self.subpixel_pitch, 1e-9, 1e9))
         if self.quilt is not None and self.quilt.views < self.views:
             raise InputError(f"quilt: {self.quilt.columns}×{self.quilt.rows} tiles cannot hold {self.views} views")
 
@@ -282,7 +286,8 @@ class Display:
             Give each sub-pixel its own camera coordinate instead of one of V views.
         """
         viewmap = masks.slanted(views, lens_pitch, subpixel_pitch, slant_deg, phase, continuous)
-        return _masked(f"slanted-{views}", (width, height), viewmap, reverse)
+        made = _masked(f"slanted-{views}", (width, height), viewmap, reverse)
+        return replace(made, subpixel_pitch=float(subpixel_pitch))
 
     @staticmethod
     def from_table(width: int, height: int, views: int, table: Any, reverse: bool = False) -> Display:
