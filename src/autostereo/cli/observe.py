@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..checks import check_number
 from ..errors import InputError
 from . import common, outputs
 from .common import note, say
@@ -44,10 +45,19 @@ def observe(
     place = None
     if eye is not None:
         x, z = common.parse_numbers(eye, "--eye", 2)
-        place = (x, z)
+        place = (check_number("--eye X", x, -1e9, 1e9), check_number("--eye Z", z, 1e-3, 1e9))
+    if view is not None:
+        view = check_number("--view", view, -1e6, 1e6)
+    if not 0 <= crosstalk < 1:
+        raise InputError(f"--crosstalk: expected a number from 0 up to but not including 1, got {crosstalk:g}")
     outputs.check_image(output)
     outputs.check_apart(output, panel)
     where = common.load_display(display, None, swap, views, continuous)
+    if where.viewmap is not None and place is not None and where.size_mm is None:
+        raise InputError(
+            f"--eye: expected a display with a size, {where.name} has none; "
+            "give a .toml of your own with size_mm below [optics], or --view U"
+        )
     pixels = common.load_picture(panel)
     width, height = where.picture_size
     if pixels.shape[:2] != (height, width) and where.viewmap is not None:
