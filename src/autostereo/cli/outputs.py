@@ -9,8 +9,15 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..errors import FileError, InputError
+from . import common
+
+if TYPE_CHECKING:
+    from ..display.display import Display
+
+LOSSY = (".jpg", ".jpeg")
 
 
 def check_output(path: Path, suffixes: tuple[str, ...] = ()) -> Path:
@@ -46,6 +53,15 @@ def check_image(path: Path) -> Path:
     from ..image import IMAGE_SUFFIXES
 
     return check_output(path, IMAGE_SUFFIXES)
+
+
+def note_lossy(path: Path, display: Display | None) -> None:
+    """Say what a lossy format does to a picture that was written for a display; None: to a quilt."""
+    if path.suffix.lower() not in LOSSY:
+        return
+    mixed = display is not None and display.viewmap is not None
+    does = "mixes the views" if mixed else "changes the picture a little"
+    common.note(f"{path}: {path.suffix} is lossy and {does}; .png and .webp keep every pixel")
 
 
 @contextmanager

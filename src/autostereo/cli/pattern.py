@@ -79,6 +79,7 @@ def pattern(
         from ..image import write_image
 
         write_image(output, pixels)
+    outputs.note_lossy(output, where)
     if kind in STEPS:
         for strip in sweep:
             say(strip.row)

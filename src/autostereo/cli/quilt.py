@@ -92,6 +92,7 @@ def quilt(
         stack = drawn(options=options)
     with common.working("writing"):
         save_quilt(path, stack, layout)
+    outputs.note_lossy(path, None)
     say(f"{path}  {layout.width}×{layout.height}")
     common.note_reuse(stack, drawn, options)
 

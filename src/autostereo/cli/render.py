@@ -87,6 +87,7 @@ def render(
     note(f"rendered in {perf_counter() - start:.2f} s")
     with common.working("writing"):
         panel.save(path)
+    outputs.note_lossy(path, where)
     if not path.stem.endswith(ending):
         note(f"{path}: its device wants a name that ends in {ending}, such as {path.stem}{ending}{path.suffix}")
     say(f"{path}  {panel.width}×{panel.height}")

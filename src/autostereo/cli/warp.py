@@ -136,4 +136,5 @@ def write_panel(output: Path, stack: ViewStack, display: Display) -> None:
     with common.working("weaving"):
         grid = (stack.views, 1)
         write_image(output, weave(stack.quilt(*grid), grid, display.viewmap, panel, "linear", flips))
+    outputs.note_lossy(output, display)
     say(f"{output}  {panel[0]}×{panel[1]}")

@@ -9,7 +9,9 @@ import typer
 
 from ..errors import InputError
 from . import common, outputs
-from .common import say
+from .common import note, say
+
+SAME_ASPECT = 0.01  # by which two aspects may differ, as names of quilts have four digits
 
 
 def weave(
@@ -66,4 +68,10 @@ def weave(
     with common.working("weaving"):
         flips = (where.flip_x, where.flip_y)
         write_image(output, draw(pixels, (columns, rows), where.viewmap, panel, filter, flips))
+    if named is not None and abs(named.aspect / where.aspect - 1) > SAME_ASPECT:
+        note(
+            f"{quilt}: was made for a display of aspect {named.aspect:g}, {where.name} has {where.aspect:.4g}: "
+            "the picture is squashed"
+        )
+    outputs.note_lossy(output, where)
     say("{}  {}×{}".format(output, *panel))
