@@ -42,6 +42,14 @@ def check_output(path: Path, suffixes: tuple[str, ...] = ()) -> Path:
     return path
 
 
+def check_folder(path: Path) -> Path:
+    """`check_output` for a folder that is made with all those above it."""
+    nearest = next(place for place in (path, *path.parents) if place.exists())
+    if not nearest.is_dir():
+        raise FileError(f"{path}: expected a folder, {'found' if nearest == path else f'{nearest} is'} a file")
+    return check_output(nearest / "part") and path
+
+
 def check_apart(output: Path, *inputs: Path) -> None:
     """Refuse an output that is one of the inputs, whatever it is called."""
     if output.exists() and any(path.exists() and path.samefile(output) for path in inputs):

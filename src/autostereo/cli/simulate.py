@@ -118,7 +118,10 @@ def _counts(text: str) -> list[int]:
     parts = [part.strip() for part in text.split(",")]
     if not all(part.isascii() and part.isdigit() and 1 <= int(part) <= MAX_VIEWS for part in parts):
         raise InputError(f"--views: expected numbers from 1 to {MAX_VIEWS} separated by commas, got {text!r}")
-    return sorted({int(part) for part in parts})
+    counts = sorted(int(part) for part in parts)
+    if len(set(counts)) < len(counts):
+        raise InputError(f"--views: expected each number once, got {text!r}")
+    return counts
 
 
 def _source(
