@@ -13,6 +13,7 @@ from .checks import check_unmasked
 from .errors import FileError, InputError
 from .image import as_path, write_atomic, write_image
 from .memory import check_memory
+from .wording import counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +71,7 @@ class ViewStack:
         ndarray of shape (R·H, C·W, 4), uint8
         """
         if columns < 1 or rows < 1 or columns * rows < self.views:
-            raise InputError(f"quilt: {columns}×{rows} tiles cannot hold {self.views} views")
+            raise InputError(f"quilt: {columns}×{rows} tiles cannot hold {counted(self.views, 'view')}")
         check_memory(4 * rows * self.height * columns * self.width, f"a quilt of {columns}×{rows} tiles")
         quilt = np.zeros((rows, self.height, columns, self.width, 4), dtype=np.uint8)
         quilt[..., 3] = 255
@@ -110,7 +111,7 @@ class ViewStack:
             That is no stack of as many views of the same size.
         """
         if not isinstance(exact, ViewStack) or exact.color.shape != self.color.shape:
-            raise InputError(f"exact: expected {self.views} views of {self.width}×{self.height}, got {_what(exact)}")
+            raise InputError(f"exact: expected {_what(self)}, got {_what(exact)}")
         return _decibels([_difference(a[..., :3], b[..., :3]) for a, b in zip(self.color, exact.color, strict=True)])
 
     def save(self, path: str | os.PathLike[str]) -> Path:
@@ -190,7 +191,7 @@ def _decibels(differences: list[float]) -> float:
 def _what(picture: object) -> str:
     """A picture, or what is none, in words."""
     if isinstance(picture, ViewStack):
-        return f"{picture.views} views of {picture.width}×{picture.height}"
+        return f"{counted(picture.views, 'view')} of {picture.width}×{picture.height}"
     if isinstance(picture, Panel):
         return f"a panel of {picture.width}×{picture.height}"
     return type(picture).__name__

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import FileError, InputError
+from .wording import no_folder
 
 IMAGE_SUFFIXES = (".png", ".webp", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 
@@ -35,7 +36,7 @@ def write_atomic(path: str | os.PathLike[str], write: Callable[[BinaryIO], objec
     path = as_path(path)
     folder = path.parent
     if not folder.is_dir():
-        raise FileError(f"{path}: the folder {folder} does not exist")
+        raise FileError(f"{path}: {no_folder(folder)}")
     if path.is_dir():
         raise FileError(f"{path}: expected a file name, found a folder")
     temporary = folder / f".{path.name}.{secrets.token_hex(4)}.part"

@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from ..checks import check_number
 from ..errors import InputError
 from . import common, outputs
 from .common import note, say
@@ -42,6 +41,8 @@ def observe(
     """
     if (view is None) == (eye is None):
         raise InputError("observe: expected either --view U or --eye X,Z")
+    from ..checks import check_number
+
     place = None
     if eye is not None:
         x, z = common.parse_numbers(eye, "--eye", 2)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import FileError, InputError
+from ..wording import counted
 from . import common, outputs
 from .common import say
 
@@ -88,7 +89,7 @@ def quilt(
 
     common.announce_compilation(engine, *kernels_for(scene, None, options, method, rig.views))
     drawn = partial(render_views, scene, rig, layout.tile, method=method, engine=engine)
-    with common.working(f"rendering {rig.views} views"):
+    with common.working(f"rendering {counted(rig.views, 'view')}"):
         stack = drawn(options=options)
     with common.working("writing"):
         save_quilt(path, stack, layout)

@@ -136,6 +136,9 @@ def _source(
             raise InputError(f"--camera and --from: {scene[0]} has its own camera path")
         return scene[0], SCENES[scene[0]].at, list(range(0, PATH, every))
     for one in scene:
+        if one in SCENES and not Path(one).exists():
+            found = f"got {len(scene)} names"
+            raise InputError(f"scene: the built-in {one} stands alone, expected one scene or files, {found}")
         if not Path(one).exists() and Path(one).suffix == "":
             raise InputError(f"scene: expected {', '.join(SCENES)} or a file, got {one!r}")
     common.check_side(side, camera)

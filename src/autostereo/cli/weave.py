@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
+from ..wording import an, counted
 from . import common, outputs
 from .common import note, say
 
@@ -52,11 +53,11 @@ def weave(
         where = where.with_views(columns * rows if views is None else views)
     elif where.viewmap is not None and views is None and columns * rows != where.views:
         raise InputError(
-            f"{quilt}: {columns}×{rows} tiles, but the mask of {where.name} has {where.views} views; "
+            f"{quilt}: {columns}×{rows} tiles, but the mask of {where.name} has {counted(where.views, 'view')}; "
             f"give --views {where.views} to take the first {where.views} tiles"
         )
     if where.viewmap is None:
-        raise InputError(f"{where.name}: a {where.layout} picture is not woven from a quilt")
+        raise InputError(f"{where.name}: {an(where.layout)} picture is not woven from a quilt")
     outputs.check_image(output)
     outputs.check_apart(output, quilt)
     common.announce_compilation("cpu", "_weave")

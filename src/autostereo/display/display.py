@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..checks import FOV_RANGE, check_choice, check_number, check_pair, check_views
 from ..errors import InputError, UnsupportedError
 from ..viewmap import ViewMap
+from ..wording import an, counted
 from . import masks
 from .calibration import Calibration, read_calibration
 from .layouts import CONE_DEG, EYES_DEG, PACKED, STEREO, Packing
@@ -108,7 +109,8 @@ class Display:
             put(self, "distance_mm", check_number("distance_mm", self.distance_mm, 1e-3, 1e9))
         put(self, "subpixel_pitch", check_number("subpixel_pitch", self.subpixel_pitch, 1e-9, 1e9))
         if self.quilt is not None and self.quilt.views < self.views:
-            raise InputError(f"quilt: {self.quilt.columns}×{self.quilt.rows} tiles cannot hold {self.views} views")
+            held = counted(self.views, "view")
+            raise InputError(f"quilt: {self.quilt.columns}×{self.quilt.rows} tiles cannot hold {held}")
 
     # --- what it is ------------------------------------------------------------------------------------
 
@@ -164,7 +166,7 @@ class Display:
         For people and tests: engines evaluate the view map row by row.
         """
         if self.viewmap is None:
-            raise UnsupportedError(f"{self.name}: a {self.layout} picture has no mask; interlaced displays have one")
+            raise UnsupportedError(f"{self.name}: {an(self.layout)} picture has no mask; interlaced displays have one")
         rows, columns = np.arange(self.height), np.arange(self.width)
         return (self.viewmap.camera if self.continuous else self.viewmap.view)(rows, columns)
 

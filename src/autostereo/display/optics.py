@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from ..checks import check_number, check_pair
 from ..errors import InputError, UnsupportedError
+from ..wording import an
 from .display import Display
 
 
@@ -46,7 +47,7 @@ def wanted_phase(
         Compare with `ViewMap.phase`, or (view + ½)/V for a table.
     """
     if display.viewmap is None:
-        raise UnsupportedError(f"{display.name}: a {display.layout} picture has no zones to look from")
+        raise UnsupportedError(f"{display.name}: {an(display.layout)} picture has no zones to look from")
     if (view is None) == (eye is None):
         raise InputError("observe: expected either view (a camera coordinate) or eye (x, z in mm)")
     if view is not None:

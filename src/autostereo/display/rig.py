@@ -30,6 +30,7 @@ from ..errors import FileError, InputError
 from ..image import as_path, write_atomic
 from ..transforms import eye_from_world
 from ..viewmap import offset_at
+from ..wording import counted
 
 if TYPE_CHECKING:
     from .display import Display
@@ -152,8 +153,8 @@ class Rig:
         """The same rig with `views` cameras over its baseline; explicit offsets must already be that many."""
         if self.offsets is not None:
             if len(self.offsets) != views:
-                given = len(self.offsets)
-                raise InputError(f"rig offsets: the display has {views} views, the rig gives {given} offsets")
+                given = counted(len(self.offsets), "offset")
+                raise InputError(f"rig offsets: the display has {counted(views, 'view')}, the rig gives {given}")
             return self
         return replace(self, views=views)
 

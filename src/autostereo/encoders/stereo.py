@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..checks import check_choice
 from ..display.layouts import STEREO, Packing
 from ..errors import InputError
+from ..wording import counted
 
 Pixels = NDArray[np.uint8]
 
@@ -143,7 +144,7 @@ def pack(views: Pixels, layout: str, *, swap: bool = False, anamorphic: bool = F
     if views.ndim != 4 or views.shape[3] not in (3, 4) or views.dtype != np.uint8 or 0 in views.shape:
         raise InputError(f"{layout}: expected views (V, H, W, 3 or 4) uint8, got {views.shape} {views.dtype}")
     if len(views) != rule.views:
-        raise InputError(f"{layout}: expected {rule.views} views, got {len(views)}")
+        raise InputError(f"{layout}: expected {counted(rule.views, 'view')}, got {len(views)}")
     if rule.size is not None and (views.shape[2], views.shape[1]) != rule.size:
         raise InputError(
             f"{layout}: expected views of {rule.size[0]}×{rule.size[1]}, got {views.shape[2]}×{views.shape[1]}"

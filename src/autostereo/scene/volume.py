@@ -134,8 +134,9 @@ class Volume:
         put(self, "values", _check_values(self.values))
         put(self, "value_range", _range(self.values))
         put(self, "spacing", check_vector("spacing", self.spacing))
-        if min(self.spacing) <= 0:
-            raise InputError(f"spacing: expected numbers > 0, got {self.spacing}")
+        if min(self.spacing) < SMALLEST:
+            wanted = "> 0" if min(self.spacing) <= 0 else f"≥ {SMALLEST:g}"
+            raise InputError(f"spacing: expected numbers {wanted}, got {self.spacing}")
         put(self, "origin", check_vector("origin", self.origin))
         put(self, "direction", _check_direction(self.direction))
         put(self, "transform", as_transform(self.transform))
