@@ -25,7 +25,7 @@ def test_preset_names_and_ranges_are_checked():
     assert {"ct-bone", "ct-soft", "ct-vessels", "mr", "mr-brain", "generic", "gray", "fire", "x-ray"} <= set(
         TransferFunction.presets()
     )
-    with pytest.raises(aus.InputError, match="'nope': there are generic"):
+    with pytest.raises(aus.InputError, match=r"transfer preset: expected one of generic, .*'nope'"):
         TransferFunction.preset("nope")
     with pytest.raises(aus.InputError, match="low < high"):
         TransferFunction.preset("gray", 3, 3)

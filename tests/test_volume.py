@@ -141,7 +141,7 @@ def test_defaults():
         ({"spacing": (1, 0, 1)}, "spacing: expected numbers > 0"),
         ({"spacing": (1, np.nan, 1)}, "spacing"),
         ({"spacing": 1.0}, "spacing: expected three"),
-        ({"spacing": (1e-300, 1, 1)}, "spacing: expected voxels of 1e-30 and more"),
+        ({"spacing": (1e-300, 1, 1)}, "spacing: expected numbers ≥ 1e-30"),
         ({"spacing": (1e15, 1, 1)}, r"spacing: expected voxels of 1e-30 and more within ±1e\+15, got 1e\+15 × 1 × 1"),
         ({"transform": np.diag([1e-40, 1, 1, 1])}, "spacing: expected voxels of 1e-30 and more"),
         ({"origin": (1, 2)}, "origin: expected three"),

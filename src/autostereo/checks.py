@@ -8,6 +8,7 @@ length of rigs and voxels that has to be > 0 is at least SMALLEST.
 from __future__ import annotations
 
 import numbers
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -49,9 +50,24 @@ def check_number(name: str, value: object, low: float = -np.inf, high: float = n
     return number
 
 
+def check_choice(name: str, value: object, choices: Iterable[str]) -> str:
+    """Return a word of `choices`, or raise InputError; arrays and lists are none."""
+    if not isinstance(value, str) or value not in choices:
+        raise InputError(f"{name}: expected one of {', '.join(choices)}, got {shown(value)}")
+    return value
+
+
+def check_pair(name: str, value: object, expected: str) -> tuple[object, object]:
+    """Return the two items of a sequence or an array, whatever they are, or raise InputError."""
+    row = isinstance(value, Sequence) and not isinstance(value, (str, bytes))
+    if not (row or (isinstance(value, np.ndarray) and value.ndim == 1)) or len(value) != 2:  # type: ignore[arg-type]
+        raise InputError(f"{name}: expected {expected}, got {shown(value)}")
+    return value[0], value[1]  # type: ignore[index]
+
+
 def check_vector(name: str, value: object, high: float = LARGEST) -> Vector:
     """Return three numbers within ±high as a tuple, or raise InputError."""
-    v = real_array(name, value, "three numbers").astype(np.float64)
+    v = plain_numbers(name, value, "three numbers").astype(np.float64)
     if v.shape != (3,) or not np.isfinite(v).all():
         raise InputError(f"{name}: expected three finite numbers, got {shown(value)}")
     if np.abs(v).max() > high:
@@ -99,18 +115,34 @@ def real_array(name: str, value: object, expected: str = "an array of numbers") 
 
     NumPy would take the real part of complex numbers, read text as numbers, count dates and uncover what is masked.
     """
-    hidden = int(np.ma.count_masked(value)) if isinstance(value, np.ma.MaskedArray) else 0
-    if hidden:
-        raise InputError(f"{name}: expected {expected}, none of them masked, found {hidden} masked entries")
+    check_unmasked(name, value, expected)
     try:
         array = np.asarray(value)
         if array.dtype.kind == "O" and all(isinstance(item, numbers.Real) for item in array.flat):
             array = array.astype(np.float64)  # whole numbers of more than 64 bits, fractions
-    except (TypeError, ValueError, OverflowError):
+    except OverflowError:
+        raise InputError(f"{name}: expected {expected} within ±{LARGEST:g}, got {shown(value)}") from None
+    except (TypeError, ValueError):
         raise InputError(f"{name}: expected {expected}, got {type(value).__name__} of uneven rows") from None
     if array.dtype.kind == "O" or array.dtype.kind not in "biuf":
         found = KINDS.get(array.dtype.kind) if isinstance(value, (np.ndarray, list, tuple)) else None
         raise InputError(f"{name}: expected {expected}, got {found or type(value).__name__}")
+    return array
+
+
+def check_unmasked(name: str, value: object, expected: str = "an array of numbers") -> None:
+    """Raise InputError where entries of an array are masked: NumPy would uncover them."""
+    hidden = int(np.ma.count_masked(value)) if isinstance(value, np.ma.MaskedArray) else 0
+    if hidden:
+        raise InputError(f"{name}: expected {expected}, none of them masked, found {hidden} masked entries")
+
+
+def plain_numbers(name: str, value: object, expected: str = "numbers") -> NDArray[Any]:
+    """`real_array` without booleans, which `check_number` refuses too, alone or among numbers."""
+    array = real_array(name, value, expected)
+    mixed = isinstance(value, (list, tuple)) and any(isinstance(item, (bool, np.bool_)) for item in value)
+    if array.dtype.kind == "b" or mixed:
+        raise InputError(f"{name}: expected {expected}, got {shown(value)}")
     return array
 
 

@@ -9,9 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from .checks import check_unmasked
 from .errors import FileError, InputError
 from .image import as_path, write_atomic, write_image
 from .memory import check_memory
+from .wording import counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +35,8 @@ class ViewStack:
     reused: float | None = None
 
     def __post_init__(self) -> None:
+        check_unmasked("color", self.color, "pixels")
+        check_unmasked("depth", self.depth, "depths")
         color = np.asarray(self.color)
         if color.ndim != 4 or color.shape[3] != 4 or color.dtype != np.uint8 or 0 in color.shape:
             raise InputError(f"color: expected (V, H, W, 4) uint8, got {color.shape} {color.dtype}")
@@ -67,7 +71,7 @@ class ViewStack:
         ndarray of shape (R·H, C·W, 4), uint8
         """
         if columns < 1 or rows < 1 or columns * rows < self.views:
-            raise InputError(f"quilt: {columns}×{rows} tiles cannot hold {self.views} views")
+            raise InputError(f"quilt: {columns}×{rows} tiles cannot hold {counted(self.views, 'view')}")
         check_memory(4 * rows * self.height * columns * self.width, f"a quilt of {columns}×{rows} tiles")
         quilt = np.zeros((rows, self.height, columns, self.width, 4), dtype=np.uint8)
         quilt[..., 3] = 255
@@ -81,6 +85,7 @@ class ViewStack:
 
         The used part of the picture is C·⌊W'/C⌋ × R·⌊H'/R⌋ pixels, counted from the bottom left (displays.md 3.1).
         """
+        check_unmasked("quilt", quilt, "pixels")
         quilt = np.asarray(quilt)
         if quilt.ndim != 3 or quilt.shape[2] not in (3, 4) or quilt.dtype != np.uint8:
             raise InputError(f"quilt: expected (H, W, 3 or 4) uint8, got {quilt.shape} {quilt.dtype}")
@@ -106,7 +111,7 @@ class ViewStack:
             That is no stack of as many views of the same size.
         """
         if not isinstance(exact, ViewStack) or exact.color.shape != self.color.shape:
-            raise InputError(f"exact: expected {self.views} views of {self.width}×{self.height}, got {_what(exact)}")
+            raise InputError(f"exact: expected {_what(self)}, got {_what(exact)}")
         errors = [squared_error(a[..., :3], b[..., :3]) for a, b in zip(self.color, exact.color, strict=True)]
         return decibels(float(np.mean(errors)))
 
@@ -146,6 +151,7 @@ class Panel:
     reused: float | None = None
 
     def __post_init__(self) -> None:
+        check_unmasked("pixels", self.pixels, "pixels")
         pixels = np.asarray(self.pixels)
         if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.dtype != np.uint8 or 0 in pixels.shape:
             raise InputError(f"pixels: expected (H, W, 3) uint8, got {pixels.shape} {pixels.dtype}")
@@ -185,7 +191,7 @@ def decibels(error: float) -> float:
 def _what(picture: object) -> str:
     """A picture, or what is none, in words."""
     if isinstance(picture, ViewStack):
-        return f"{picture.views} views of {picture.width}×{picture.height}"
+        return f"{counted(picture.views, 'view')} of {picture.width}×{picture.height}"
     if isinstance(picture, Panel):
         return f"a panel of {picture.width}×{picture.height}"
     return type(picture).__name__

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from .checks import shown
 from .errors import FileError, InputError
 from .temporary import holding
+from .wording import no_folder
 
 IMAGE_SUFFIXES = (".png", ".webp", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 
@@ -54,7 +55,7 @@ def write_atomic(path: str | os.PathLike[str], write: Callable[[BinaryIO], objec
     path = as_path(path)
     folder = path.parent
     if not folder.is_dir():
-        raise FileError(f"{path}: the folder {folder} does not exist")
+        raise FileError(f"{path}: {no_folder(folder)}")
     if path.is_dir():
         raise FileError(f"{path}: expected a file name, found a folder")
     try:

@@ -26,6 +26,7 @@ from .methods import depth_of_field
 from .scene.scene import Scene
 from .scene.transfer import TransferFunction
 from .scene.volume import Volume
+from .wording import an, counted
 
 PACKING = {"rgbd": 7}  # bytes for each pixel of a packed picture, its parts included; else 3
 
@@ -243,7 +244,7 @@ def interlace(views: ViewStack, display: Display) -> Panel:
     if not isinstance(views, ViewStack) or not isinstance(display, Display):
         raise InputError("interlace: expected a ViewStack and a Display")
     if display.viewmap is None:
-        raise UnsupportedError(f"{display.name}: a {display.layout} picture has no mask to interlace by")
+        raise UnsupportedError(f"{display.name}: {an(display.layout)} picture has no mask to interlace by")
     if (views.width, views.height) != (display.width, display.height) or views.views != display.views:
         raise InputError(
             f"views: expected {display.views} of {display.width}×{display.height} for {display.name}, "
@@ -324,7 +325,7 @@ def observe(
     if not isinstance(panel, Panel) or not isinstance(display, Display):
         raise InputError("observe: expected a Panel and a Display")
     if display.viewmap is None:
-        raise UnsupportedError(f"{display.name}: a {display.layout} picture is not seen through lenses")
+        raise UnsupportedError(f"{display.name}: {an(display.layout)} picture is not seen through lenses")
     if panel.pixels.shape[:2] != (display.height, display.width):
         raise InputError(
             f"panel: expected {display.width}×{display.height} pixels for {display.name}, "
@@ -349,4 +350,4 @@ def describe(shape: tuple[int, ...]) -> str:
     """A picture's shape in words."""
     if len(shape) == 3 and shape[2] == 3:
         return f"a panel of {shape[1]}×{shape[0]} pixels"
-    return f"{shape[0]} views of {shape[2]}×{shape[1]} pixels"
+    return f"{counted(shape[0], 'view')} of {shape[2]}×{shape[1]} pixels"

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .checks import check_views, real_array
+from .checks import check_views, real_array, shown
 from .errors import InputError
 
 CELL_MODES = (0, 1, 2, 3, 4)
@@ -99,8 +99,8 @@ class ViewMap:
             raise InputError(f"offsets: expected shape (cells, 3), got {offsets.shape}")
         if not (np.isfinite(offsets).all() and np.isfinite([self.a, self.b]).all()):
             raise InputError("view map: expected finite phase coefficients")
-        if self.cell_mode not in CELL_MODES:
-            raise InputError(f"cell_mode: expected one of {CELL_MODES}, got {self.cell_mode}")
+        if not isinstance(self.cell_mode, (int, np.integer)) or self.cell_mode not in CELL_MODES:
+            raise InputError(f"cell_mode: expected one of {CELL_MODES}, got {shown(self.cell_mode)}")
         if self.cell_mode != 0 and self.height < 1:
             raise InputError(f"height: cells need the panel's number of rows, got {self.height}")
         object.__setattr__(self, "offsets", offsets)

@@ -33,6 +33,8 @@ VERBS: tuple[Callable[..., None], ...] = (
     render, quilt, views, warp, weave, observe, pattern, displays, info, demo, bench, simulate
 )  # fmt: skip
 
+NUMBERS = {"int": "a whole number", "float": "a number"}  # by the first word of what Pydantic calls an error
+
 app = typer.Typer(
     name="autostereo", rich_markup_mode=None, pretty_exceptions_enable=False, no_args_is_help=True, add_completion=False
 )
@@ -98,11 +100,20 @@ def run(arguments: Sequence[str]) -> int:
     return int(status or 0)
 
 
+def _usage(error: Any) -> str:
+    """What a usage error says; of a value that is no number, what was found, which typer leaves out."""
+    causes: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()
+    wanted = NUMBERS.get(str(causes[0].get("type")).split("_")[0]) if causes else None
+    if wanted is None or error.param is None:
+        return str(error.format_message())
+    return f"{error.param.opts[0]}: expected {wanted}, got {causes[0].get('input')!r}"
+
+
 def _status_of(error: Any) -> int:
     """Print the one line that an error deserves and return the exit status."""
     if hasattr(error, "format_message"):  # typer's usage errors, from click or its own copy of it
         hint = getattr(getattr(error, "ctx", None), "command_path", "autostereo")
-        return _complain(f"{error.format_message()} (see {hint} --help)")
+        return _complain(f"{_usage(error)} (see {hint} --help)")
     if type(error).__name__ == "Abort":
         return 130
     if hasattr(error, "exit_code"):

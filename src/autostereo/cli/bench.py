@@ -57,10 +57,16 @@ def bench(
         outputs.check_output(json, (".json",))
     if plots is not None and name != "papers":
         raise InputError(f"bench --plots: only papers has charts, got {name!r}")
+    if plots is not None:
+        outputs.check_folder(plots)
     from .benchmarks import report
+    from .benchmarks.papers_plots import need_matplotlib
     from .benchmarks.suite import BenchOptions
 
     options = BenchOptions(quick=quick, only=tuple(works or ()), data=data, repeats=repeats, budget=budget)
+    report.check(name, options)
+    if plots is not None:
+        need_matplotlib()
     results = report.bench(name, options, json, common.note)
     if plots is not None:
         report.plot(plots, results)

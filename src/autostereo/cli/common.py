@@ -136,13 +136,16 @@ def parse_color(text: str, name: str = "--background") -> tuple[float, float, fl
     if text.startswith("#") and len(text) == 7:
         try:
             value = int(text[1:], 16)
+            return (value >> 16) / 255, (value >> 8 & 255) / 255, (value & 255) / 255
         except ValueError:
-            raise InputError(f"{name}: expected #rrggbb, got {text!r}") from None
-        return (value >> 16) / 255, (value >> 8 & 255) / 255, (value & 255) / 255
-    red, green, blue = parse_numbers(text, name, 3)
-    if min(red, green, blue) < 0 or max(red, green, blue) > 1:
-        raise InputError(f"{name}: expected values 0…1, got {text!r}")
-    return red, green, blue
+            pass
+    try:
+        red, green, blue = parse_numbers(text, name, 3)
+        if 0 <= min(red, green, blue) and max(red, green, blue) <= 1:
+            return red, green, blue
+    except InputError:
+        pass
+    raise InputError(f"{name}: expected #rrggbb, R,G,B in 0…1, black, grey or white, got {text!r}")
 
 
 def check_views(views: int | None) -> None:

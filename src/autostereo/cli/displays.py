@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,12 +24,16 @@ def displays(
       autostereo displays looking-glass-portrait
       autostereo displays /media/usb/LKG_calibration/visual.json
     """
+    from ..display.presets import preset_title
+
     if name is not None:
-        for label, value in describe(common.load_display(name)):
+        lines = describe(common.load_display(name))
+        if title := preset_title(name):
+            lines.insert(1, ("title", title))
+        for label, value in lines:
             print(f"{label:<12} {value}")
         return
     from ..display.display import Display
-    from ..display.presets import preset_title
 
     rows = []
     for preset in Display.presets():
@@ -69,7 +74,9 @@ def describe(display: Display) -> list[tuple[str, str]]:
         height, width, _ = viewmap.table.shape
         lines.append(("mask", f"table, repeated every {width}×{height} px"))
     elif viewmap is not None and viewmap.offsets is not None:
-        lens = f"lens of {abs(3 / viewmap.a):.6g} sub-pixels" if viewmap.a else "lens along the rows"
+        lens = f"lens of {abs(3 / viewmap.a):.6g} sub-pixels along the row" if viewmap.a else "lens along the rows"
+        if viewmap.a and viewmap.b:
+            lens += f" ({3 / math.hypot(viewmap.a, viewmap.b):.6g} across the lens)"
         lines.append(("mask", f"{lens}, phase {viewmap.a:+.9g} per pixel, {viewmap.b:+.9g} per row"))
         if len(viewmap.offsets) > 1:
             lines.append(("cells", f"{len(viewmap.offsets)}, pattern {viewmap.cell_mode}"))

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
+from ..wording import counted
 from . import common
 
 if TYPE_CHECKING:
@@ -161,7 +162,7 @@ def describe_depth(scene: Scene, display: Display, rig: Rig | None) -> list[tupl
     near, far = budget.comfortable
     verdict = "fits" if budget.fits else "too deep: reduce the baseline, or move the focal plane into the scene"
     return [
-        ("display", f"{display.name}, {display.views} views"),
+        ("display", f"{display.name}, {counted(display.views, 'view')}"),
         ("cameras", f"baseline {budget.baseline:.4g}, focal distance {budget.focal_distance:.4g} (scene units)"),
         ("depth", f"{budget.nearest:.4g} to {budget.farthest:.4g} in front of the cameras"),
         ("disparity", f"{budget.disparity_near:+.2f} px nearest, {budget.disparity_far:+.2f} px farthest, per view"),

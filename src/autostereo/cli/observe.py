@@ -41,13 +41,24 @@ def observe(
     """
     if (view is None) == (eye is None):
         raise InputError("observe: expected either --view U or --eye X,Z")
+    from ..checks import check_number
+
     place = None
     if eye is not None:
         x, z = common.parse_numbers(eye, "--eye", 2)
-        place = (x, z)
+        place = (check_number("--eye X", x, -1e9, 1e9), check_number("--eye Z", z, 1e-3, 1e9))
+    if view is not None:
+        view = check_number("--view", view, -1e6, 1e6)
+    if not 0 <= crosstalk < 1:
+        raise InputError(f"--crosstalk: expected a number from 0 up to but not including 1, got {crosstalk:g}")
     outputs.check_image(output)
     outputs.check_apart(output, panel)
     where = common.load_display(display, None, swap, views, continuous)
+    if where.viewmap is not None and place is not None and where.size_mm is None:
+        raise InputError(
+            f"--eye: expected a display with a size, {where.name} has none; "
+            "give a .toml of your own with size_mm below [optics], or --view U"
+        )
     pixels = common.load_picture(panel)
     width, height = where.picture_size
     if pixels.shape[:2] != (height, width) and where.viewmap is not None:

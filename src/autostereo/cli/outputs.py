@@ -8,10 +8,17 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..errors import FileError, InputError
 from ..temporary import holding
+from ..wording import no_folder
 from .common import note
+
+if TYPE_CHECKING:
+    from ..display.display import Display
+
+LOSSY = (".jpg", ".jpeg")
 
 
 def check_output(path: Path, suffixes: tuple[str, ...] = ()) -> Path:
@@ -27,12 +34,36 @@ def check_output(path: Path, suffixes: tuple[str, ...] = ()) -> Path:
         raise InputError(f"{path}: expected a name ending in {' '.join(suffixes)}, got {path.suffix or 'no suffix'}")
     folder = path.parent
     if not folder.is_dir():
-        raise FileError(f"{path}: the folder {folder} does not exist")
+        raise FileError(f"{path}: {no_folder(folder)}")
+    _check_writable(path, folder)
+    return path
+
+
+def _check_writable(path: Path, folder: Path) -> None:
     try:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
         raise FileError(f"{path}: the folder {folder} is not writable ({error.strerror or error})") from error
+
+
+def folder_or_file(output: str, suffixes: tuple[str, ...]) -> tuple[Path, str]:
+    """Where to write, and its suffix in small letters: "" for a folder.
+
+    One is a name without a suffix or that ends in a slash, and what is a folder already but for its suffix.
+    """
+    path = Path(output)
+    suffix = path.suffix.lower()
+    folder = output.endswith(("/", os.sep)) or (path.is_dir() and suffix not in suffixes)
+    return path, "" if folder else suffix
+
+
+def check_folder(path: Path) -> Path:
+    """`check_output` for a folder that is made with all those above it."""
+    nearest = next(place for place in (path, *path.parents) if place.exists())
+    if not nearest.is_dir():
+        raise FileError(f"{path}: expected a folder, {'found' if nearest == path else f'{nearest} is'} a file")
+    _check_writable(path, nearest)
     return path
 
 
@@ -53,6 +84,15 @@ def note_ending(path: Path, ending: str) -> None:
     """Say so when the device would not know a picture by its name; see `Display.ending`."""
     if not path.stem.endswith(ending):
         note(f"{path}: its device wants a name that ends in {ending}, such as {path.stem}{ending}{path.suffix}")
+
+
+def note_lossy(path: Path, display: Display | None) -> None:
+    """Say what a lossy format does to a picture that was written for a display; None: to a quilt."""
+    if path.suffix.lower() not in LOSSY:
+        return
+    mixed = display is not None and display.viewmap is not None
+    does = "mixes the views" if mixed else "changes the picture a little"
+    note(f"{path}: {path.suffix} is lossy and {does}; .png and .webp keep every pixel")
 
 
 @contextmanager

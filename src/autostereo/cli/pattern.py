@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError
+from ..wording import an
 from . import common, outputs
 from .common import note, say
 
@@ -26,7 +27,7 @@ PICTURE_ROWS = 270  # the drawn pictures are enlarged to the panel: one drawing 
 BAND = 64  # panel rows at a time, for the same reason
 
 READ = {
-    "numbers": "Move to the right: the numbers should count up. Down? Use --swap. Two at once? See --kind phase.",
+    "numbers": "Move to the right: the numbers should count up. Down? Use --swap.",
     "eyes": "From the middle, the left eye should see a red L and the right eye a blue R. The other way? Use --swap.",
     "pitch": "From the middle with one eye: take the strip with the fewest colour changes; x1 is the present value.",
     "slope": "From the middle with one eye: take the strip whose colour borders stand upright.",
@@ -66,7 +67,7 @@ def pattern(
         raise InputError(f"--strips: expected a number from 3 to 99, got {strips}")
     width = STEPS.get(kind, 0.0) if step is None else step
     if step is not None and not 0 < abs(step) * strips < 2:
-        raise InputError(f"--step: expected a small number other than 0, got {step:g}")
+        raise InputError(f"--step: expected a number other than 0 and within ±{2 / strips:.3g}, got {step:g}")
     where = common.load_display(display, size, swap, views)
     outputs.check_image(output)
     with common.working("drawing"):
@@ -79,10 +80,12 @@ def pattern(
         from ..image import write_image
 
         write_image(output, pixels)
+    outputs.note_lossy(output, where)
     if kind in STEPS:
         for strip in sweep:
             say(strip.row)
-    note(READ[kind])
+    varies = where.viewmap is not None and where.viewmap.offsets is not None
+    note(READ[kind] + (" Two at once? See --kind phase." if kind == "numbers" and varies else ""))
     outputs.note_ending(output, where.ending)
     say(f"{output}  {pixels.shape[1]}×{pixels.shape[0]}")
 
@@ -154,7 +157,7 @@ def spread(display: Display, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def _spread_packed(display: Display, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """The same for layouts without a mask: enlarge, then pack."""
     if display.views < 2:
-        raise InputError(f"{display.name}: a {display.layout} picture has no views to tell apart")
+        raise InputError(f"{display.name}: {an(display.layout)} picture has no views to tell apart")
     import numpy as np
 
     from ..encoders.stereo import pack
@@ -180,7 +183,10 @@ def make_sweep(display: Display, kind: str, strips: int, step: float) -> list[St
 
     Pitch and slope turn about the middle of the panel, so that the phase there stays.
     """
-    if display.viewmap is None or display.viewmap.offsets is None:
+    if display.viewmap is None:
+        what = an(display.layout)
+        raise InputError(f"--kind {kind}: {display.name}: {what} picture has no lenses, whose {kind} varies")
+    if display.viewmap.offsets is None:
         raise InputError(f"--kind {kind}: {display.name} has a fixed table, which has no {kind} to vary")
     sweep = []
     for k in range(strips):
@@ -213,9 +219,11 @@ def _vary_mask(display: Display, kind: str, change: float) -> tuple[ViewMap, str
     assert viewmap.offsets is not None
     viewmap = replace(viewmap, offsets=viewmap.offsets + shift)
     slant = math.atan2(-b, a) if a > 0 else math.atan2(b, -a)
-    pitch = 3 / abs(a) * math.cos(slant) if a else math.inf
+    unit = display.subpixel_pitch
+    pitch = 3 / math.hypot(a, b) * unit if a or b else math.inf
     phase = float((base.offsets[0, 0] + shift) % 1.0)
-    return viewmap, f"lens_pitch {pitch:.6g} sub-pixels, slant_deg {math.degrees(slant):.6g}, phase {phase:.5f}"
+    numbers = f"slant_deg {math.degrees(slant):.6g}, phase {phase:.5f}"
+    return viewmap, f"lens_pitch {pitch:.6g}, subpixel_pitch {unit:.12g}, {numbers}"
 
 
 def _vary_calibration(display: Display, kind: str, change: float) -> tuple[ViewMap, str]:

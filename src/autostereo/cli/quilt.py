@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import FileError, InputError
+from ..wording import counted
 from . import common, outputs
 from .common import say
 
@@ -86,10 +87,11 @@ def quilt(
     from ..render import render_views
 
     drawn = partial(render_views, scene, rig, layout.tile, method=method, engine=engine)
-    with common.working(f"rendering {rig.views} views"):
+    with common.working(f"rendering {counted(rig.views, 'view')}"):
         stack = drawn(options=options)
     with common.working("writing"):
         save_quilt(path, stack, layout)
+    outputs.note_lossy(path, None)
     say(f"{path}  {layout.width}×{layout.height}")
     common.note_reuse(stack, drawn, options)
 

@@ -83,6 +83,7 @@ def render(
     note(f"rendered in {perf_counter() - start:.2f} s")
     with common.working("writing"):
         panel.save(path)
+    outputs.note_lossy(path, where)
     outputs.note_ending(path, where.ending)
     say(f"{path}  {panel.width}×{panel.height}")
     common.note_reuse(panel, drawn, options)

@@ -115,7 +115,10 @@ def _counts(text: str) -> list[int]:
     parts = [part.strip() for part in text.split(",")]
     if not all(part.isascii() and part.isdigit() and 1 <= int(part) <= MAX_VIEWS for part in parts):
         raise InputError(f"--views: expected numbers from 1 to {MAX_VIEWS} separated by commas, got {text!r}")
-    return sorted({int(part) for part in parts})
+    counts = sorted(int(part) for part in parts)
+    if len(set(counts)) < len(counts):
+        raise InputError(f"--views: expected each number once, got {text!r}")
+    return counts
 
 
 def _source(
@@ -130,6 +133,9 @@ def _source(
             raise InputError(f"--camera and --from: {scene[0]} has its own camera path")
         return scene[0], SCENES[scene[0]].at, list(range(0, PATH, every))
     for one in scene:
+        if one in SCENES and not Path(one).exists():
+            found = f"got {len(scene)} names"
+            raise InputError(f"scene: the built-in {one} stands alone, expected one scene or files, {found}")
         if not Path(one).exists() and Path(one).suffix == "":
             raise InputError(f"scene: expected {', '.join(SCENES)} or a file, got {one!r}")
     common.check_side(side, camera)

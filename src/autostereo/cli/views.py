@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import DependencyError, InputError
+from ..wording import counted
 from . import common, outputs
 from .common import say
 
@@ -23,7 +24,7 @@ ANIMATIONS = (".gif", ".webp", ".mp4")
 def views(
     inputs: common.Inputs,
     output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="OUT", help="Folder, or a .gif .webp .mp4 .npz file.")
+        str, typer.Option("--output", "-o", metavar="OUT", help="Folder, or a .gif .webp .mp4 .npz file.")
     ],
     views: common.ViewCount = None,
     size: common.Size = None,
@@ -68,10 +69,11 @@ def views(
       autostereo views head.nrrd -o head.webp --mode mip
       autostereo views bunny.ply -o bunny/ --views 2 --depth-of-field 8x8
     """
-    suffix = output.suffix.lower()
+    path, suffix = outputs.folder_or_file(output, (".npz", *ANIMATIONS))
     pixels = common.parse_size(size) if size else (512, 512)
     if suffix not in ("", ".npz", *ANIMATIONS):
-        raise InputError(f"{output}: expected a folder, or a name ending in .npz {' '.join(ANIMATIONS)}, got {suffix}")
+        endings = f".npz {' '.join(ANIMATIONS)}"
+        raise InputError(f"{path}: expected a name ending in {endings}, or a folder ({path}/), got {suffix}")
     if depth and suffix != ".npz":
         raise InputError("--depth: only a .npz file can hold it")
     if aperture is not None and (lens is None or not aperture > 0):
@@ -83,7 +85,7 @@ def views(
 
     common.check_views(views)
     if suffix in ANIMATIONS:
-        check_animation(output, pixels)
+        check_animation(path, pixels)
     options = Options(
         shading=shading, lighting=lighting, samples=samples, depth=depth, step=step, volume=volume,
         views_per_pass=views_per_pass, references=references,
@@ -91,8 +93,8 @@ def views(
     volumes = common.VolumeOptions(shape, dtype, frame, spacing, transfer, mode, iso)
     common.check_side(side, camera)
     rig = common.load_camera(camera)
-    outputs.check_output(output, (suffix,) if suffix else ())
-    outputs.check_apart(output, *inputs)
+    outputs.check_output(path, (suffix,) if suffix else ())
+    outputs.check_apart(path, *inputs)
     scene = common.load_scene(inputs, background, volumes)
     rig = common.frame_views(scene, rig, views, pixels, display, side)
     if lens is not None:
@@ -101,15 +103,14 @@ def views(
     from ..render import render_views
 
     drawn = partial(render_views, scene, rig, pixels, method=method, engine=engine)
-    with common.working(f"rendering {rig.views} views"):
+    with common.working(f"rendering {counted(rig.views, 'view')}"):
         stack = drawn(options=options)
-    write_views(output, stack, rig)
+    write_views(path, suffix, stack, rig)
     common.note_reuse(stack, drawn, options)
 
 
-def write_views(output: Path, stack: ViewStack, rig: Rig) -> None:
-    """Write an animation, an array, or a folder with the cameras, by the output's name."""
-    suffix = output.suffix.lower()
+def write_views(output: Path, suffix: str, stack: ViewStack, rig: Rig) -> None:
+    """Write an animation, an array, or, without a suffix, a folder with the cameras."""
     with common.working("writing"):
         if suffix in ANIMATIONS:
             from ..encoders.video import save_animation
@@ -121,7 +122,7 @@ def write_views(output: Path, stack: ViewStack, rig: Rig) -> None:
             with outputs.whole_folder(output, stale="view_*.png") as folder:
                 stack.save(folder)
                 rig.save(folder / "rig.json")
-    say(f"{output}  {stack.views} views of {stack.width}×{stack.height}")
+    say(f"{output}  {counted(stack.views, 'view')} of {stack.width}×{stack.height}")
 
 
 def check_animation(path: Path, size: tuple[int, int]) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import InputError
+from ..wording import an, counted
 from . import common, outputs
 from .common import note, say
 from .views import ANIMATIONS, check_animation, write_views
@@ -22,7 +23,7 @@ def warp(
     picture: Annotated[Path, typer.Argument(metavar="PICTURE", help="A picture.")],
     depth: Annotated[Path, typer.Argument(metavar="DEPTH", help="Its depths: .npy, or grey .png or .tif of 16 bits.")],
     output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="OUT", help="Picture; or folder, or .gif .webp .mp4 .npz.")
+        str, typer.Option("--output", "-o", metavar="OUT", help="Picture; or folder, or .gif .webp .mp4 .npz.")
     ],
     display: common.OptionalDisplayName = None,
     size: common.Size = None,
@@ -45,29 +46,29 @@ def warp(
       autostereo warp room.png room_depth.png --unit 0.001 --fov 45 -d looking-glass-portrait -o panel.png
       autostereo warp room.png room_depth.npy -o room.gif --views 12
     """
+    from ..checks import LARGEST, SMALLEST, check_number
     from ..image import IMAGE_SUFFIXES
 
-    suffix = output.suffix.lower()
+    path, suffix = outputs.folder_or_file(output, (".npz", *ANIMATIONS, *IMAGE_SUFFIXES))
     to_panel = display is not None and suffix in IMAGE_SUFFIXES
     if not to_panel and suffix not in ("", ".npz", *ANIMATIONS):
-        raise InputError(f"{output}: expected --display with a picture, or a folder, .npz {' '.join(ANIMATIONS)}")
+        raise InputError(f"{path}: expected --display with a picture, or a folder, .npz {' '.join(ANIMATIONS)}")
     if not to_panel and size is not None:
         raise InputError("--size: is that of a panel's picture; views have the size of PICTURE")
-    if not 0 < unit < 1e30:
-        raise InputError(f"--unit: expected a number > 0, got {unit:g}")
+    check_number("--unit", unit, SMALLEST, LARGEST)
     if fov is not None and (camera is not None or not 0 < fov < 179):
         raise InputError(f"--fov: expected degrees between 0 and 179, and no --camera, got {fov:g}")
     where = None if display is None else common.load_display(display, size, swap, views)
     if where is not None and where.viewmap is None and to_panel:
-        raise InputError(f"{where.name}: a {where.layout} picture is not interlaced; leave out --display for views")
+        raise InputError(f"{where.name}: {an(where.layout)} picture is not interlaced; leave out --display for views")
     common.check_views(views)
-    outputs.check_output(output, (suffix,) if suffix else ())
-    outputs.check_apart(output, picture, depth)
+    outputs.check_output(path, (suffix,) if suffix else ())
+    outputs.check_apart(path, picture, depth)
     rig = common.load_camera(camera)
     field = rig.fov_y if rig is not None else 36.0 if fov is None else fov
     taken = read_rgbd(picture, depth, unit)
     if suffix in ANIMATIONS and not to_panel:
-        check_animation(output, (taken.width, taken.height))
+        check_animation(path, (taken.width, taken.height))
 
     from ..display.display import Display
     from ..display.framing import frame_depths
@@ -81,13 +82,13 @@ def warp(
         assert taken.depth is not None
         rig = frame_depths(taken.depth[0], target, field)
     rig = replace(rig.with_views(target.views), fov_y=field, aspect=taken.width / taken.height)
-    with common.working(f"warping to {rig.views} views"):
+    with common.working(f"warping to {counted(rig.views, 'view')}"):
         stack = draw(taken, rig)
     if to_panel:
         assert where is not None
-        write_panel(output, stack, where)
+        write_panel(path, stack, where)
     else:
-        write_views(output, stack, rig)
+        write_views(path, suffix, stack, rig)
 
 
 def read_rgbd(picture: Path, depth: Path, unit: float) -> ViewStack:
@@ -134,4 +135,5 @@ def write_panel(output: Path, stack: ViewStack, display: Display) -> None:
     with common.working("weaving"):
         grid = (stack.views, 1)
         write_image(output, weave(stack.quilt(*grid), grid, display.viewmap, panel, "linear", flips))
+    outputs.note_lossy(output, display)
     say(f"{output}  {panel[0]}×{panel[1]}")

@@ -8,8 +8,11 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
+from ..wording import an, counted
 from . import common, outputs
-from .common import say
+from .common import note, say
+
+SAME_ASPECT = 0.01  # by which two aspects may differ, as names of quilts have four digits
 
 
 def weave(
@@ -50,11 +53,11 @@ def weave(
         where = where.with_views(columns * rows if views is None else views)
     elif where.viewmap is not None and views is None and columns * rows != where.views:
         raise InputError(
-            f"{quilt}: {columns}×{rows} tiles, but the mask of {where.name} has {where.views} views; "
+            f"{quilt}: {columns}×{rows} tiles, but the mask of {where.name} has {counted(where.views, 'view')}; "
             f"give --views {where.views} to take the first {where.views} tiles"
         )
     if where.viewmap is None:
-        raise InputError(f"{where.name}: a {where.layout} picture is not woven from a quilt")
+        raise InputError(f"{where.name}: {an(where.layout)} picture is not woven from a quilt")
     outputs.check_image(output)
     outputs.check_apart(output, quilt)
     pixels = common.load_picture(quilt, alpha=True)
@@ -65,4 +68,10 @@ def weave(
     with common.working("weaving"):
         flips = (where.flip_x, where.flip_y)
         write_image(output, draw(pixels, (columns, rows), where.viewmap, panel, filter, flips))
+    if named is not None and abs(named.aspect / where.aspect - 1) > SAME_ASPECT:
+        note(
+            f"{quilt}: was made for a display of aspect {named.aspect:g}, {where.name} has {where.aspect:.4g}: "
+            "the picture is squashed"
+        )
+    outputs.note_lossy(output, where)
     say("{}  {}×{}".format(output, *panel))

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import FOV_RANGE, check_number, check_views
+from ..checks import FOV_RANGE, check_choice, check_number, check_pair, check_views
 from ..errors import InputError, UnsupportedError
 from ..viewmap import ViewMap
+from ..wording import an, counted
 from . import masks
 from .calibration import Calibration, read_calibration
 from .layouts import CONE_DEG, EYES_DEG, PACKED, STEREO, Packing
@@ -65,6 +66,8 @@ class Display:
         What the name of a picture's file ends in, before its suffix, by which the device knows it; "": anything.
     calibration : Calibration, optional
         The Looking Glass calibration behind the mask.
+    subpixel_pitch : float
+        Width of a sub-pixel in the unit that the lenses of `slanted` were given in; masks do not depend on it.
     """
 
     name: str
@@ -85,13 +88,13 @@ class Display:
     note: str = ""
     ending: str = ""
     calibration: Calibration | None = None
+    subpixel_pitch: float = 1.0
 
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "width", check_size("width", self.width))
         put(self, "height", check_size("height", self.height))
-        if self.layout not in LAYOUTS:
-            raise InputError(f"layout: expected one of {', '.join(LAYOUTS)}, got {self.layout!r}")
+        check_choice("layout", self.layout, LAYOUTS)
         if (self.layout == "interlaced") != (self.viewmap is not None):
             problem = "a view map is missing" if self.viewmap is None else "takes no view map"
             raise InputError(f"layout {self.layout}: {problem}")
@@ -107,8 +110,10 @@ class Display:
             put(self, "size_mm", _pair_mm(self.size_mm))
         if self.distance_mm is not None:
             put(self, "distance_mm", check_number("distance_mm", self.distance_mm, 1e-3, 1e9))
+        put(self, "subpixel_pitch", check_number("subpixel_pitch", self.subpixel_pitch, 1e-9, 1e9))
         if self.quilt is not None and self.quilt.views < self.views:
-            raise InputError(f"quilt: {self.quilt.columns}×{self.quilt.rows} tiles cannot hold {self.views} views")
+            held = counted(self.views, "view")
+            raise InputError(f"quilt: {self.quilt.columns}×{self.quilt.rows} tiles cannot hold {held}")
 
     # --- what it is ------------------------------------------------------------------------------------
 
@@ -164,7 +169,7 @@ class Display:
         For people and tests: engines evaluate the view map row by row.
         """
         if self.viewmap is None:
-            raise UnsupportedError(f"{self.name}: a {self.layout} picture has no mask; interlaced displays have one")
+            raise UnsupportedError(f"{self.name}: {an(self.layout)} picture has no mask; interlaced displays have one")
         rows, columns = np.arange(self.height), np.arange(self.width)
         return (self.viewmap.camera if self.continuous else self.viewmap.view)(rows, columns)
 
@@ -286,7 +291,8 @@ class Display:
             Give each sub-pixel its own camera coordinate instead of one of V views.
         """
         viewmap = masks.slanted(views, lens_pitch, subpixel_pitch, slant_deg, phase, continuous)
-        return _masked(f"slanted-{views}", (width, height), viewmap, reverse)
+        made = _masked(f"slanted-{views}", (width, height), viewmap, reverse)
+        return replace(made, subpixel_pitch=float(subpixel_pitch))
 
     @staticmethod
     def from_table(width: int, height: int, views: int, table: Any, reverse: bool = False) -> Display:
@@ -335,9 +341,7 @@ class Display:
         is four views of half the panel's size, the two left ones above. "row-interleaved", "column-interleaved" and
         "checkerboard" are masks.
         """
-        if layout not in STEREO_LAYOUTS:
-            raise InputError(f"layout: expected one of {', '.join(STEREO_LAYOUTS)}, got {layout!r}")
-        if layout in masks.TWO_VIEW_TABLES:
+        if check_choice("layout", layout, STEREO_LAYOUTS) in masks.TWO_VIEW_TABLES:
             display = _masked(layout, (width, height), masks.two_view(layout), reverse)
             return replace(display, cone_deg=EYES_DEG, comfort=_two_view_comfort(width))
         return _packed(layout, layout, (width, height), reverse)
@@ -354,9 +358,8 @@ class Display:
 
 
 def _pair_mm(value: Any) -> tuple[float, float]:
-    if isinstance(value, (str, bytes)) or not isinstance(value, (Sequence, np.ndarray)) or len(value) != 2:
-        raise InputError(f"size_mm: expected (width, height) in millimetres, got {value!r}")
-    return (check_number("size_mm width", value[0], 1e-3, 1e9), check_number("size_mm height", value[1], 1e-3, 1e9))
+    width, height = check_pair("size_mm", value, "(width, height) in millimetres")
+    return (check_number("size_mm width", width, 1e-3, 1e9), check_number("size_mm height", height, 1e-3, 1e9))
 
 
 def _two_view_comfort(width: Any) -> float:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import FARTHEST, SMALLEST, real_array
+from ..checks import FARTHEST, SMALLEST, check_choice, real_array
 from ..errors import InputError
 from .display import Display
 from .rig import Rig
@@ -84,9 +84,10 @@ def frame_rig(scene: Any, display: Display, side: str = "front") -> Rig:
     then all alike. The baseline joins the outermost cameras (ends included); for a continuous mask, whose camera
     coordinate runs half a step beyond them, the fit covers that.
     """
+    if not isinstance(display, Display):
+        raise InputError(f"display: expected a Display, such as Display.preset('…'), got {type(display).__name__}")
     center, half = _box(scene)
-    if side not in SIDES:
-        raise InputError(f"side: expected one of {', '.join(SIDES)}, got {side!r}")
+    check_choice("side", side, SIDES)
     anatomical = any(getattr(item, "anatomical", False) for item in getattr(scene, "objects", (scene,)))
     towards, up = (PATIENT_SIDES if anatomical else SIDES)[side]
     hx, hy, hz = (float(np.abs(axis) @ half) for axis in (np.cross(up, towards), up, towards))

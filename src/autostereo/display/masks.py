@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import check_number, check_views, real_array
+from ..checks import check_choice, check_number, check_views, real_array
 from ..errors import InputError
 from ..viewmap import ViewMap
 
@@ -37,9 +37,7 @@ def check_flag(name: str, value: Any) -> bool:
 def lenticular(views: int, per: str) -> ViewMap:
     """Lenses along the columns: view = x mod V per pixel, s mod V per sub-pixel (de Sorbier 2008, Fig. 4a)."""
     views = check_views(views)
-    if per not in PITCHES:
-        raise InputError(f"per: expected one of {', '.join(PITCHES)}, got {per!r}")
-    if per == "subpixel":
+    if check_choice("per", per, PITCHES) == "subpixel":
         return sloped(views, 1, 0)
     return ViewMap(views, np.repeat(np.arange(views)[None, :, None], 3, axis=2))
 

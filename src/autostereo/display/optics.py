@@ -21,8 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import check_number
+from ..checks import check_number, check_pair
 from ..errors import InputError, UnsupportedError
+from ..wording import an
 from .display import Display
 
 
@@ -46,7 +47,7 @@ def wanted_phase(
         Compare with `ViewMap.phase`, or (view + ½)/V for a table.
     """
     if display.viewmap is None:
-        raise UnsupportedError(f"{display.name}: a {display.layout} picture has no zones to look from")
+        raise UnsupportedError(f"{display.name}: {an(display.layout)} picture has no zones to look from")
     if (view is None) == (eye is None):
         raise InputError("observe: expected either view (a camera coordinate) or eye (x, z in mm)")
     if view is not None:
@@ -57,10 +58,8 @@ def wanted_phase(
 
 def zone_coordinate(display: Display, eye: Any) -> NDArray[np.float64]:
     """Zone coordinate f (W, 3) that an eye at (X, Z) mm selects, 0…1 in the central cone (DESIGN section 5)."""
-    if isinstance(eye, (str, bytes)) or not isinstance(eye, (Sequence, np.ndarray)) or len(eye) != 2:
-        raise InputError(f"eye: expected (x, z) in mm, got {eye!r}")
-    x_eye = check_number("eye x", eye[0], -1e9, 1e9)
-    z_eye = check_number("eye z", eye[1], 1e-3, 1e9)
+    x, z = check_pair("eye", eye, "(x, z) in mm")
+    x_eye, z_eye = check_number("eye x", x, -1e9, 1e9), check_number("eye z", z, 1e-3, 1e9)
     slope = (x_eye - column_mm(display)) / z_eye
     if display.distance_mm is not None:
         slope = slope + column_mm(display) / display.distance_mm

@@ -81,8 +81,11 @@ def preset_names() -> list[str]:
 
 
 def preset_title(name: str) -> str:
-    """What a built-in display is called in full."""
-    return str(_built_in()[name].get("title", name))
+    """What a built-in display, or that of a .toml, is called in full; "" where its file does not say."""
+    fields = _built_in().get(name)
+    if fields is None:
+        fields = _parse(name, _read(Path(name))) if name.lower().endswith(".toml") else {}
+    return str(fields.get("title", ""))
 
 
 def load_preset(name: str | os.PathLike[str]) -> Display:

@@ -18,22 +18,25 @@ from ..checks import (
     FOV_RANGE,
     SMALLEST,
     Vector,
+    check_choice,
     check_direction,
     check_number,
     check_reach,
     check_vector,
     check_views,
-    real_array,
+    plain_numbers,
 )
 from ..errors import FileError, InputError
 from ..image import as_path, write_atomic
 from ..transforms import eye_from_world
 from ..viewmap import offset_at
+from ..wording import counted
 
 if TYPE_CHECKING:
     from .display import Display
 
 LENGTHS = {"focal_distance": SMALLEST, "near": SMALLEST, "baseline": 0.0, "offset_y": -FARTHEST}  # from … to FARTHEST
+OPTIONAL = ("focal_distance", "near")  # lengths that are None until something says them
 SPACINGS = ("linear", "equal-angle", "cell-centred")
 
 
@@ -88,18 +91,17 @@ class Rig:
         _ = self.eye_from_world  # raises if degenerate
         put(self, "fov_y", check_number("rig fov_y", self.fov_y, *FOV_RANGE))
         for name, low in LENGTHS.items():
-            if getattr(self, name) is not None:
+            if name not in OPTIONAL or getattr(self, name) is not None:
                 put(self, name, check_number(f"rig {name}", getattr(self, name), low, FARTHEST))
         if self.aspect is not None:
             put(self, "aspect", check_number("rig aspect", self.aspect, *ASPECT_RANGE))
         put(self, "views", check_views(self.views, "rig views"))
-        if self.spacing not in SPACINGS:
-            raise InputError(f"rig spacing: expected one of {', '.join(SPACINGS)}, got {self.spacing!r}")
+        check_choice("rig spacing", self.spacing, SPACINGS)
         if self.offsets is not None:
             self._check_offsets()
 
     def _check_offsets(self) -> None:
-        given = real_array("rig offsets", self.offsets, "numbers").astype(np.float64)
+        given = plain_numbers("rig offsets", self.offsets).astype(np.float64)
         if given.ndim != 1 or given.size == 0 or not np.isfinite(given).all() or (np.diff(given) <= 0).any():
             raise InputError("rig offsets: expected finite numbers, strictly ascending (view 0 is the leftmost)")
         check_reach("rig offsets", given, FARTHEST)
@@ -151,8 +153,8 @@ class Rig:
         """The same rig with `views` cameras over its baseline; explicit offsets must already be that many."""
         if self.offsets is not None:
             if len(self.offsets) != views:
-                given = len(self.offsets)
-                raise InputError(f"rig offsets: the display has {views} views, the rig gives {given} offsets")
+                given = counted(len(self.offsets), "offset")
+                raise InputError(f"rig offsets: the display has {counted(views, 'view')}, the rig gives {given}")
             return self
         return replace(self, views=views)
 
@@ -178,7 +180,7 @@ class Rig:
         """Read a JSON file of rig fields; unknown fields are errors."""
         path = as_path(path)
         try:
-            fields: Any = json.loads(path.read_text(encoding="utf-8"))
+            fields: Any = json.loads(path.read_text(encoding="utf-8-sig"))
         except OSError as error:
             raise FileError(f"{path}: cannot be read ({error.strerror})") from error
         except (ValueError, RecursionError) as error:

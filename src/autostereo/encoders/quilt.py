@@ -15,6 +15,7 @@ from ..display.quilt import Quilt
 from ..errors import InputError
 from ..frame import ViewStack
 from ..image import as_path, write_image
+from ..wording import counted
 
 MAX_TILES = 32  # tiles a side, and pixels a side, that Looking Glass software takes
 MAX_PIXELS = 16384
@@ -101,7 +102,7 @@ def choose_grid(views: int, width: int, height: int) -> tuple[int, int]:
     if views < 1 or best is None:
         raise InputError(
             f"quilt: no grid of at most {MAX_TILES}×{MAX_TILES} tiles and {MAX_PIXELS}×{MAX_PIXELS} pixels holds "
-            f"{views} views of {width}×{height}"
+            f"{counted(views, 'view')} of {width}×{height}"
         )
     return best[1]
 
@@ -140,7 +141,7 @@ def pack_quilt(
     """
     check_grid(columns, rows)
     if columns * rows < views.views:
-        raise InputError(f"quilt: {columns}×{rows} tiles cannot hold {views.views} views")
+        raise InputError(f"quilt: {columns}×{rows} tiles cannot hold {counted(views.views, 'view')}")
     used = (columns * views.width, rows * views.height)
     size = used if size is None else size
     if max(*size, *used) > MAX_PIXELS:

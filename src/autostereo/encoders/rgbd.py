@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import check_choice
 from ..errors import InputError
 from .stereo import halve
 
@@ -83,8 +84,7 @@ def rgbd(color: Pixels, disparity: Pixels, side: str = "right") -> Pixels:
         raise InputError(f"rgbd: expected a picture (H, W, 3 or 4) uint8, got {color.shape} {color.dtype}")
     if disparity.shape != color.shape[:2] or disparity.dtype != np.uint8:
         raise InputError(f"rgbd: expected a map {color.shape[:2]} uint8, got {disparity.shape} {disparity.dtype}")
-    if side not in SIDES:
-        raise InputError(f"rgbd side: expected one of {', '.join(SIDES)}, got {side!r}")
+    check_choice("rgbd side", side, SIDES)
     parts = [color[..., :3], np.repeat(disparity[..., None], 3, axis=2)]
     return np.concatenate(parts if side in ("right", "bottom") else parts[::-1], axis=1 if side in SIDES[:2] else 0)
 

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import check_choice
 from ..display.layouts import STEREO, Packing
 from ..errors import InputError
+from ..wording import counted
 
 Pixels = NDArray[np.uint8]
 
@@ -137,13 +139,12 @@ def pack(views: Pixels, layout: str, *, swap: bool = False, anamorphic: bool = F
     InputError
         Unknown layout, wrong number or size of views, an odd size to halve.
     """
-    if layout not in LAYOUTS:
-        raise InputError(f"layout: expected one of {', '.join(LAYOUTS)}, got {layout!r}")
+    check_choice("layout", layout, LAYOUTS)
     views, rule = np.asarray(views), LAYOUTS[layout]
     if views.ndim != 4 or views.shape[3] not in (3, 4) or views.dtype != np.uint8 or 0 in views.shape:
         raise InputError(f"{layout}: expected views (V, H, W, 3 or 4) uint8, got {views.shape} {views.dtype}")
     if len(views) != rule.views:
-        raise InputError(f"{layout}: expected {rule.views} views, got {len(views)}")
+        raise InputError(f"{layout}: expected {counted(rule.views, 'view')}, got {len(views)}")
     if rule.size is not None and (views.shape[2], views.shape[1]) != rule.size:
         raise InputError(
             f"{layout}: expected views of {rule.size[0]}×{rule.size[1]}, got {views.shape[2]}×{views.shape[1]}"

@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import shown
 from ..errors import InputError, UnsupportedError
 from ..scene.scene import Scene
 from ..viewmap import ViewMap
@@ -195,10 +196,10 @@ def choose_engine(scene: Scene) -> str:
 
 def get_engine(name: str, scene: Scene | None = None) -> Engine:
     """Return the engine called `name`; "auto" is the fastest there is, for the scene if one is given."""
-    if name == "auto":
+    if isinstance(name, str) and name == "auto":
         name = "cpu" if scene is None else choose_engine(scene)
     if not isinstance(name, str) or name not in ENGINES:
-        raise UnsupportedError(f"engine {name!r}: there are {', '.join(ENGINES)} and auto")
+        raise UnsupportedError(f"engine {shown(name)}: there are {', '.join(ENGINES)} and auto")
     if name not in _made:
         _made[name] = ENGINES[name]()
     return _made[name]

@@ -7,8 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import check_choice
 from ..errors import InputError
 from ..viewmap import ViewMap
+from ..wording import counted
 
 Pixels = NDArray[np.uint8]
 
@@ -33,7 +35,7 @@ def check_interlace(views: Pixels, viewmap: ViewMap, out: Pixels) -> None:
     if views.ndim != 4 or views.shape[3] not in (3, 4) or views.dtype != np.uint8 or 0 in views.shape:
         raise InputError(f"interlace: expected views (V, H, W, 4) uint8, got {views.shape} {views.dtype}")
     if views.shape[0] != viewmap.views:
-        raise InputError(f"interlace: the display has {viewmap.views} views, got {views.shape[0]} pictures")
+        raise InputError(f"interlace: the display has {counted(viewmap.views, 'view')}, got {len(views)} pictures")
     if out.shape != (*views.shape[1:3], 3) or out.dtype != np.uint8:
         raise InputError(f"interlace: expected a panel {(*views.shape[1:3], 3)} uint8, got {out.shape} {out.dtype}")
 
@@ -48,11 +50,11 @@ def quilt_tiles(
     if columns < 1 or rows < 1 or quilt.shape[1] < columns or quilt.shape[0] < rows:
         raise InputError(f"quilt: {quilt.shape[1]}×{quilt.shape[0]} pixels cannot be {columns}×{rows} tiles")
     if columns * rows < viewmap.views:
-        raise InputError(f"quilt: {columns}×{rows} tiles cannot hold the {viewmap.views} views of the display")
+        needed = counted(viewmap.views, "view")
+        raise InputError(f"quilt: {columns}×{rows} tiles cannot hold the {needed} of the display")
     if width < 1 or height < 1:
         raise InputError(f"size: expected a panel of at least 1×1 pixels, got {width}×{height}")
-    if filter not in FILTERS:
-        raise InputError(f"filter: expected one of {', '.join(FILTERS)}, got {filter!r}")
+    check_choice("filter", filter, FILTERS)
     return Tiles(
         columns, quilt.shape[1] // columns, quilt.shape[0] // rows, quilt.shape[1], quilt.shape[0], quilt.shape[2]
     )

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import FARTHEST, LARGEST, SMALLEST, check_number
 from ..errors import FileError
 from .files import PathLike, read_bytes
 from .image import decode
@@ -32,8 +33,9 @@ def read_depth(path: PathLike, unit: float = 1.0) -> NDArray[np.float32]:
     Raises
     ------
     FileError
-        The file is missing, damaged, of another shape or kind, or holds depths below 0.
+        The file is missing, damaged, of another shape or kind, holds depths below 0, or none from 1e-30 to 1e15.
     """
+    unit = check_number("unit", unit, SMALLEST, LARGEST)
     if Path(path).suffix.lower() == ".npy":
         found = read_arrays(path)
     else:
@@ -45,7 +47,12 @@ def read_depth(path: PathLike, unit: float = 1.0) -> NDArray[np.float32]:
         raise FileError(f"{path}: expected depths ≥ 0 (0: none), found {found.min():g}")
     with np.errstate(over="ignore", under="ignore"):
         depth = (found * np.float64(unit)).astype(np.float32)
+    low, high = SMALLEST / unit, FARTHEST / unit
     depth[~(depth > 0)] = np.inf
+    known = (found > 0) & (found < np.inf)
+    if known.any() and not (known & (found >= low) & (found <= high)).any():
+        first = found[known].flat[0]
+        raise FileError(f"{path}: expected depths from {low:g} to {high:g} (0: none), found {first:g} and the like")
     return depth
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from types import ModuleType
 
+from ..checks import shown
 from ..engines.engine import Engine
 from ..errors import UnsupportedError
 from . import dibr, n_pass, n_pass_subres, single_pass
@@ -25,9 +26,11 @@ GL = "gl"
 
 def get_method(name: str, engine: Engine) -> ModuleType:
     """Return the schedule called `name`, which has draw_views and draw_panel, if `engine` can draw it."""
+    if not isinstance(name, str):
+        raise UnsupportedError(f"method {shown(name)}: the {engine.name} engine has {', '.join(engine.methods)}")
     if name in getattr(engine, "own_methods", ()):
         return single_pass
-    if not isinstance(name, str) or name not in METHODS or name not in engine.methods:
+    if name not in METHODS or name not in engine.methods:
         hint = f"; engine {GL} has it (--engine {GL})" if engine.name != GL and name in _methods_of_gl() else ""
         raise UnsupportedError(f"method {name!r}: the {engine.name} engine has {', '.join(engine.methods)}{hint}")
     return METHODS[name]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import FARTHEST, Vector, check_direction, check_number, check_vector, real_array
+from ..checks import FARTHEST, Vector, check_direction, check_number, check_vector, real_array, shown
 from ..errors import InputError
 
 ROUNDING = 1e-6  # of colours that were calculated in float32
@@ -37,8 +37,8 @@ class Material:
         for name in ("ambient", "diffuse", "specular"):
             object.__setattr__(self, name, check_number(f"material {name}", getattr(self, name), 0.0, 1e6))
         object.__setattr__(self, "shininess", check_number("material shininess", self.shininess, 0.0, 1e4))
-        if self.two_sided not in (None, True, False):
-            raise InputError(f"material two_sided: expected True, False or None, got {self.two_sided!r}")
+        if self.two_sided is not None and not isinstance(self.two_sided, (bool, np.bool_)):
+            raise InputError(f"material two_sided: expected True, False or None, got {shown(self.two_sided)}")
 
 
 @dataclass(frozen=True)

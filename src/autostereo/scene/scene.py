@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,10 +39,7 @@ class Scene:
     background: Vector = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        objects = (self.objects,) if isinstance(self.objects, PRIMITIVES) else self.objects
-        if not isinstance(objects, Iterable):
-            raise InputError(f"objects: expected an object or a sequence of them, got {type(objects).__name__}")
-        objects = tuple(objects)
+        objects = _listed("objects", self.objects, PRIMITIVES, "an object or a sequence of them")
         if not objects:
             raise InputError("objects: expected at least one, got none")
         for item in objects:
@@ -50,10 +48,7 @@ class Scene:
                 raise InputError(f"objects: expected {names}, got {type(item).__name__}")
         object.__setattr__(self, "objects", objects)
         if self.lights is not None:
-            lights = (self.lights,) if isinstance(self.lights, (DirectionalLight, PointLight)) else self.lights
-            if not isinstance(lights, Iterable):
-                raise InputError(f"lights: expected lights, got {type(lights).__name__}")
-            lights = tuple(lights)
+            lights = _listed("lights", self.lights, (DirectionalLight, PointLight), "lights")
             for light in lights:
                 if not isinstance(light, (DirectionalLight, PointLight)):
                     raise InputError(f"lights: expected lights, got {type(light).__name__}")
@@ -73,3 +68,13 @@ class Scene:
     def of(thing: Scene | SceneObject | Sequence[SceneObject]) -> Scene:
         """Return `thing` as a Scene; a single object or a sequence of objects will do."""
         return thing if isinstance(thing, Scene) else Scene(thing)  # type: ignore[arg-type]
+
+
+def _listed(name: str, given: Any, kinds: tuple[type, ...], expected: str) -> tuple[Any, ...]:
+    """One of `kinds`, or what a sequence holds, as a tuple."""
+    if isinstance(given, kinds):
+        return (given,)
+    try:
+        return tuple(given)
+    except TypeError:  # arrays without axes say that they can be iterated over
+        raise InputError(f"{name}: expected {expected}, got {type(given).__name__}") from None

@@ -282,7 +282,7 @@ class TransferFunction:
         """
         path = as_path(path)
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
+            data = json.loads(path.read_text(encoding="utf-8-sig"))
         except FileNotFoundError:
             raise FileError(f"{path}: no such file") from None
         except OSError as error:

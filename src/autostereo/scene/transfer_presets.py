@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import LARGEST, check_number
+from ..checks import LARGEST, check_choice, check_number, shown
 from ..errors import DependencyError, InputError
 
 CT = (-1000.0, 2000.0)  # Hounsfield units: air −1000, water 0, soft tissue 20…80, bone from about 200
@@ -185,8 +185,7 @@ def _check_range(low: object, high: object) -> tuple[float, float]:
 
 def make_preset(name: str, low: float | None, high: float | None, scale: float) -> NDArray[np.float64]:
     """Return the points (K, 5) of a preset whose range is mapped on low…high and whose opacities are times `scale`."""
-    if name not in PRESETS:
-        raise InputError(f"transfer preset {name!r}: there are {', '.join(PRESETS)}")
+    check_choice("transfer preset", name, PRESETS)
     (first, last), rows = PRESETS[name]
     low, high = _check_range(first if low is None else low, last if high is None else high)
     points = np.array(rows, dtype=np.float64)
@@ -216,7 +215,7 @@ def fit(name: str, value_range: tuple[float, float], diagonal: float) -> NDArray
     """Return the points (K, 5) of a preset or a colour map over a range of values in bounds of a diagonal."""
     low, high = value_range
     high = high if high > low else low + max(1.0, abs(low))
-    if name in PRESETS:
+    if isinstance(name, str) and name in PRESETS:
         if PRESETS[name][0] == CT and low < -500:  # Hounsfield units
             low, high = CT
         return make_preset(name, low, high, 1 / diagonal)
@@ -234,7 +233,9 @@ def fit(name: str, value_range: tuple[float, float], diagonal: float) -> NDArray
 
 def _stops(name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Positions (K,) in 0…1 and colours (K, 3) of a colour map."""
-    reverse = isinstance(name, str) and name.endswith("_r")
+    if not isinstance(name, str):
+        raise InputError(f"colour map: expected its name, got {shown(name)}")
+    reverse = name.endswith("_r")
     base = name[:-2] if reverse else name
     if base in CORNERS:
         rows = np.array(CORNERS[base])

@@ -8,7 +8,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import FARTHEST, LARGEST, SMALLEST, Vector, check_number, check_reach, check_vector, real_array
+from ..checks import (
+    FARTHEST,
+    LARGEST,
+    SMALLEST,
+    Vector,
+    check_choice,
+    check_number,
+    check_reach,
+    check_vector,
+    real_array,
+)
 from ..errors import InputError
 from ..transforms import apply, as_transform
 from .appearance import Material
@@ -124,8 +134,9 @@ class Volume:
         put(self, "values", _check_values(self.values))
         put(self, "value_range", _range(self.values))
         put(self, "spacing", check_vector("spacing", self.spacing))
-        if min(self.spacing) <= 0:
-            raise InputError(f"spacing: expected numbers > 0, got {self.spacing}")
+        if min(self.spacing) < SMALLEST:
+            wanted = "> 0" if min(self.spacing) <= 0 else f"≥ {SMALLEST:g}"
+            raise InputError(f"spacing: expected numbers {wanted}, got {self.spacing}")
         put(self, "origin", check_vector("origin", self.origin))
         put(self, "direction", _check_direction(self.direction))
         put(self, "transform", as_transform(self.transform))
@@ -135,8 +146,7 @@ class Volume:
             sizes = " × ".join(f"{x:g}" for x in self.voxel_size)
             raise InputError(f"spacing: expected voxels of {SMALLEST:g} and more within ±{FARTHEST:g}, got {sizes}")
         for name, choices in (("mode", MODES), ("gradient", GRADIENTS)):
-            if getattr(self, name) not in choices:
-                raise InputError(f"{name}: expected one of {', '.join(choices)}, got {getattr(self, name)!r}")
+            check_choice(name, getattr(self, name), choices)
         for name in ("shade", "anatomical"):
             if not isinstance(getattr(self, name), (bool, np.bool_)):
                 raise InputError(f"{name}: expected True or False, got {getattr(self, name)!r}")

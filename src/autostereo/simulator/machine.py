@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields, replace
 from importlib import resources
 from typing import Any
 
+from ..checks import check_choice
 from ..errors import FileError, InputError
 from ..image import as_path
 
@@ -31,8 +32,7 @@ def _whole(name: str, value: object, low: int, high: int) -> None:
 
 
 def _one_of(name: str, value: object, names: tuple[str, ...]) -> None:
-    if value not in names:
-        raise InputError(f"machine {name}: expected one of {', '.join(names)}, got {value!r}")
+    check_choice(f"machine {name}", value, names)
 
 
 def _flag(name: str, value: object) -> None:

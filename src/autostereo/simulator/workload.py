@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import check_choice
 from ..errors import InputError, UnsupportedError
 from ..scene.appearance import DirectionalLight, Light
 from ..scene.mesh import Mesh
@@ -80,8 +81,7 @@ class Draw:
             raise InputError(f"draw attributes: expected ({len(corners)}, 3, A), got {attributes.shape}")
         if isinstance(self.shader, str) and self.shader not in SHADERS:
             raise InputError(f"draw shader: expected one of {', '.join(SHADERS)} or a function, got {self.shader!r}")
-        if self.blend not in BLENDS:
-            raise InputError(f"draw blend: expected one of {', '.join(BLENDS)}, got {self.blend!r}")
+        check_choice("draw blend", self.blend, BLENDS)
         object.__setattr__(self, "corners", corners)
         object.__setattr__(self, "attributes", attributes)
 

@@ -18,6 +18,8 @@ from .mesh_contenders import MODERNGL, MeshStudio
 from .suite import BenchOptions, Keep, Results, Say, Work, check_works, run_works
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from ...display.display import Display
     from .workloads import Size
 
@@ -81,9 +83,14 @@ def _has_bunny(options: BenchOptions, say: Say) -> bool:
     if options.data is None:
         say("without the Stanford bunny: --data names the folder with meshes/bun_zipper.ply")
         return False
-    if not (options.data / "meshes" / "bun_zipper.ply").is_file():
-        raise InputError(f"{options.data}: expected a folder with meshes/bun_zipper.ply")
+    check_bunny(options.data)
     return True
+
+
+def check_bunny(data: Path) -> None:
+    """Raise InputError unless the folder has the Stanford bunny."""
+    if not (data / "meshes" / "bun_zipper.ply").is_file():
+        raise InputError(f"{data}: expected a folder with meshes/bun_zipper.ply")
 
 
 # --- works -----------------------------------------------------------------------------------------------------------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,12 @@ from ...image import write_atomic
 UNITS = {"fps": "frames per second", "%": "per cent", "ms": "milliseconds", "dB": "PSNR in dB", "a sample": "a sample"}
 LINES = ("2020-fig15", "2020-fig15-dibr")  # by a number of views
 LOGARITHMIC = ("fps", "ms")
+
+
+def need_matplotlib() -> None:
+    """Raise DependencyError where it is not installed."""
+    if find_spec("matplotlib") is None:
+        raise DependencyError("bench --plots needs matplotlib: pip install autostereo[bench]")
 
 
 def plot(folder: Path, results: Sequence[dict[str, Any]]) -> list[Path]:
@@ -35,10 +42,9 @@ def plot(folder: Path, results: Sequence[dict[str, Any]]) -> list[Path]:
     DependencyError
         matplotlib is not installed.
     """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise DependencyError("bench --plots needs matplotlib: pip install autostereo[bench]") from None
+    need_matplotlib()
+    from matplotlib.figure import Figure
+
     folder.mkdir(parents=True, exist_ok=True)
     shown = [f for f in results if f["value"] is not None and f["unit"] in UNITS]
     charts: dict[tuple[str, str], list[dict[str, Any]]] = {}

@@ -8,14 +8,26 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from ...errors import InputError
 from ...image import write_atomic
 from . import mesh, papers, points, volume
-from .suite import BenchOptions, Say
+from .suite import BenchOptions, Say, check_works
 
 Results = Sequence[dict[str, Any]]
 
 # each has WORKS, run, facts
 SUITES: dict[str, ModuleType] = {"mesh": mesh, "volume": volume, "points": points, "papers": papers}
+
+
+def check(name: str, options: BenchOptions) -> None:
+    """Raise InputError, before anything is measured, where a work or the data folder is none."""
+    check_works(name, SUITES[name].WORKS, options.only)
+    if options.data is None:
+        return
+    if name == "mesh" and not options.quick:
+        mesh.check_bunny(options.data)
+    elif not options.data.is_dir():
+        raise InputError(f"{options.data}: expected a folder with meshes/ or volumes/, found none")
 
 
 def bench(name: str, options: BenchOptions, path: Path | None = None, say: Say = print) -> Results:
@@ -30,6 +42,7 @@ def bench(name: str, options: BenchOptions, path: Path | None = None, say: Say =
     say : callable
         Is told in one line what is being measured and what is left out.
     """
+    check(name, options)
     suite = SUITES[name]
     facts = suite.facts(options)  # before the run, whose own load does not count
 

@@ -1,0 +1,45 @@
+"""The command line: arguments that are wrong are refused before the long work, not after it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from autostereo.cli.benchmarks import report
+from commandline import Run, refused
+
+
+@pytest.fixture
+def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Benchmarks that ask the machine anything, or measure, fail."""
+
+    def work(*_: object, **__: object) -> None:
+        raise AssertionError("there was work")
+
+    for suite in report.SUITES.values():
+        monkeypatch.setattr(suite, "facts", work)
+        monkeypatch.setattr(suite, "run", work)
+
+
+@pytest.mark.usefixtures("no_work")
+def test_bench_looks_at_its_arguments_first(cli: Run, folder: Path) -> None:
+    for more in ((), ("weave",)):
+        refused(cli("bench", "mesh", *more, "--data", "nope"), "nope: expected a folder with meshes/bun_zipper.ply")
+    for name in ("papers", "volume", "points"):
+        refused(cli("bench", name, "--data", "nope"), "nope: expected a folder")
+    refused(cli("bench", "mesh", "--quick", "--data", "square.off"), "square.off: expected a folder")
+    refused(cli("bench", "mesh", "nothing"), "there is no work 'nothing'")
+
+
+@pytest.mark.usefixtures("no_work")
+def test_bench_plots_go_into_a_folder(cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    refused(cli("bench", "papers", "--plot", "square.off"), "square.off: expected a folder, found a file")
+    refused(cli("bench", "papers", "--plot", "square.off/a/b"), "expected a folder, square.off is a file")
+    monkeypatch.setattr("autostereo.cli.benchmarks.papers_plots.find_spec", lambda name: None)
+    refused(cli("bench", "papers", "--plot", "charts/new"), "pip install autostereo[bench]")
+    assert not Path("charts").exists()
+
+
+def test_simulated_numbers_of_views_come_once(cli: Run, folder: Path) -> None:
+    refused(cli("simulate", "level", "-n", "1,4,1"), "--views: expected each number once, got '1,4,1'")
