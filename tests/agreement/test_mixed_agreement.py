@@ -197,3 +197,19 @@ def test_a_renderer_that_moves_and_colours_a_mixed_scene(engine):
     fresh = [replace(item, transform=matrix) for item, matrix in zip(scene.objects, each, strict=True)]
     fresh[2] = replace(fresh[2], transfer=scene.objects[2].transfer.scaled(3.0))
     np.testing.assert_array_equal(found, views(aus.Scene(fresh, LIGHTS), RIG, engine).color)
+
+
+@pytest.mark.parametrize("step", [0.25, 1.0])
+def test_volumes_that_overlap_take_half_of_the_light_together(engine, step):
+    """Homogeneous boxes, one within the other: half is taken ln 2 / (τ₁ + τ₂) behind their face, whatever the slabs."""
+    need(engine)
+    boxes = [
+        aus.Volume(np.ones((2, 2, 2), np.float32), (size,) * 3, (-size / 2, -size / 2, 1 - size),
+                   transfer=aus.TransferFunction([(0, 1, 0.5, 0, tau)]), shade=False)
+        for size, tau in ((2.0, 0.3), (1.5, 0.5))
+    ]  # fmt: skip
+    rig = aus.Rig(position=(0, 0, 5), fov_y=10, views=1, baseline=0.0)
+    options = aus.Options(depth=True, step=step, volume="exact")
+    for name in ("reference", engine):
+        seen = aus.render_views(aus.Scene(boxes), rig, (9, 9), engine=name, options=options).depth
+        assert seen[0, 4, 4] == pytest.approx(4 + np.log(2) / 0.8, abs=2e-3)

@@ -31,9 +31,9 @@ RAYS = 128  # of a block
 ROW = 144  # distance of a block's rows
 (
     ORIGIN, TURN, ENTER, LEAVE, LENGTH, T, R, G, B, HALF, FRONT, BACK, OPTICAL, SHARE,
-    END, LIT, TOTAL, DONE, KEPT,
-) = (np.uint64(k * ROW) for k in (*range(16), 21, 22, 23))  # fmt: skip
-BLOCK_ROWS = 24
+    END, LIT, TOTAL, DONE, KEPT, BEFORE, BEGIN, FINISH,
+) = (np.uint64(k * ROW) for k in (*range(16), *range(21, 27)))  # fmt: skip
+BLOCK_ROWS = 27
 ZERO, ONE, HALF_WAY = np.float32(0.0), np.float32(1.0), np.float32(0.5)
 TEN_BITS, COLOR_STEP = np.int32(1023), np.float32(1.0 / 1023.0)
 OPAQUE = 128  # transmittance in 65536ths, below which a ray has seen enough
@@ -243,12 +243,11 @@ def blend(n, base, material, light, rays, packed):
 
 
 @inlined
-def find_half(n, base, depth, distance, rays):
-    """Note where opacity reaches ½, optical depth growing evenly within a slab: T before it is in OPTICAL."""
-    near, far = np.float32(depth), np.float32(depth + distance)
+def find_half(n, base, rays):
+    """Note where opacity reaches ½, optical depth growing evenly from BEGIN to FINISH; T was BEFORE."""
     for i in range(n):
-        before, after = rays[base + OPTICAL + i], rays[base + T + i]
-        enter, leave = max(near, rays[base + ENTER + i]), min(far, rays[base + LEAVE + i])
+        before, after = rays[base + BEFORE + i], rays[base + T + i]
+        enter, leave = rays[base + BEGIN + i], rays[base + FINISH + i]
         left = log2_fast(max(before, TINY))
         part = (left + ONE) / max(left - log2_fast(max(after, TINY)), np.float32(1e-9))
         if (before > HALF_WAY) & (after <= HALF_WAY):
@@ -285,15 +284,20 @@ def seen(bounds, cut, slices, k, marks):
 
 @lean
 def add_optical(n, base, cut, row, slices, k, way, planes, rays, packed):
-    """Add the optical depth of slab k of one of several volumes to TOTAL."""
+    """Add the optical depth of slab k of one of several volumes to TOTAL; BEGIN … FINISH is what they fill of it."""
     depth = slices.first + k * slices.distance
     sample_volume(n, base, depth, cut, row, planes, FRONT, rays)
     sample_volume(n, base, depth + slices.distance, cut, row, planes, BACK, rays)
     share_of_slab(n, base, depth, slices.distance, rays)
     trim_ends(n, base, cut, row, depth, slices.distance, rays)
     classify(n, base, way.table, planes.place, rays, packed)
+    near, far = np.float32(depth), np.float32(depth + slices.distance)
     for i in range(n):
-        rays[base + TOTAL + i] += rays[base + OPTICAL + i] * rays[base + SHARE + i] * rays[base + LENGTH + i]
+        own = rays[base + OPTICAL + i] * rays[base + SHARE + i] * rays[base + LENGTH + i]
+        enter, leave = max(near, rays[base + ENTER + i]), min(far, rays[base + LEAVE + i])
+        rays[base + TOTAL + i] += own
+        rays[base + BEGIN + i] = min(rays[base + BEGIN + i], enter if own > ZERO else rays[base + BEGIN + i])
+        rays[base + FINISH + i] = max(rays[base + FINISH + i], leave if own > ZERO else rays[base + FINISH + i])
 
 
 @inlined
@@ -313,7 +317,7 @@ def part_of_total(n, base, rays):
 def march(n, base, cut, row, slices, first, last, way, wants_half, among, planes, rays, packed):
     """Take a block of rays through slabs first … last; way: see volume_views.Ways.
 
-    among: other volumes share the slab, TOTAL is their optical depth together.
+    among: other volumes share the slab, TOTAL is their optical depth together, and half of it is found elsewhere.
     """
     fresh = False
     material = (np.float32(way.material[0]), np.float32(way.material[1]), np.float32(way.material[2]))
@@ -343,12 +347,15 @@ def march(n, base, cut, row, slices, first, last, way, wants_half, among, planes
             for i in range(n):
                 rays[base + SHARE + i] = ONE - exp2_fast(-rays[base + SHARE + i])
         if light_slab(n, base, 0.5 * (depth + after), cut, row, way.own_eyes, planes, rays):
-            if wants_half:
+            if wants_half and not among:
+                near, far = np.float32(depth), np.float32(after)
                 for i in range(n):
-                    rays[base + OPTICAL + i] = rays[base + T + i]
+                    rays[base + BEFORE + i] = rays[base + T + i]
+                    rays[base + BEGIN + i] = max(near, rays[base + ENTER + i])
+                    rays[base + FINISH + i] = min(far, rays[base + LEAVE + i])
             blend(n, base, material, way.light, rays, packed)
-            if wants_half:
-                find_half(n, base, depth, slices.distance, rays)
+            if wants_half and not among:
+                find_half(n, base, rays)
         for i in range(n):
             rays[base + FRONT + i] = rays[base + BACK + i]
         fresh = True

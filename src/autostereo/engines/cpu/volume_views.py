@@ -12,8 +12,11 @@ from .view_rows import row_views, steps_along
 from .volume_blend import blend_group, clear_line, even_out, load_sums
 from .volume_modes import NONE, march_iso, march_mip, resolve_iso, resolve_mip
 from .volume_rays import (
+    BEFORE,
+    BEGIN,
     DONE,
     END,
+    FINISH,
     HALF,
     HALF_WAY,
     HIDDEN,
@@ -31,6 +34,7 @@ from .volume_rays import (
     T,
     add_optical,
     block_bounds,
+    find_half,
     march,
     ray_stretch,
     seen,
@@ -75,6 +79,9 @@ def add_totals(n, base, cuts, row, slices, ways, k, planes, rays, packed):
     for i in range(n):
         rays[base + TOTAL + i] = ZERO
         rays[base + DONE + i] = ZERO
+        rays[base + BEFORE + i] = rays[base + T + i]
+        rays[base + BEGIN + i] = np.float32(np.inf)
+        rays[base + FINISH + i] = ZERO
     for v in range(len(cuts)):
         if seen(bounds, cuts[v], slices, k, planes[v].marks):
             ray_stretch(n, base, cuts[v], row, slices.first, rays)
@@ -127,6 +134,8 @@ def trace_rays(cuts, row, slices, ways, wants_half, averaged, planes, rays, pack
                 march_iso(n, base, cut, row, slices, k, last, way.level, planes[v], rays)
             else:
                 march(n, base, cut, row, slices, k, last, way, wants_half, among, planes[v], rays, packed)
+        if among and wants_half:
+            find_half(n, base, rays)
         if averaged:
             average_alphas(np.uint64(PIXELS), base, rays)
     way = ways[0]
