@@ -28,7 +28,9 @@ def main() -> None:
     _speak_any_text()
     from .app import run
 
-    sys.exit(run(sys.argv[1:]))
+    status = run(sys.argv[1:])
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done: Ctrl-C would only spoil the exit
+    sys.exit(status)
 
 
 def _speak_any_text() -> None:
