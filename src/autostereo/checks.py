@@ -124,7 +124,7 @@ def real_array(name: str, value: object, expected: str = "an array of numbers") 
         raise InputError(f"{name}: expected {expected} within ±{LARGEST:g}, got {shown(value)}") from None
     except (TypeError, ValueError):
         raise InputError(f"{name}: expected {expected}, got {type(value).__name__} of uneven rows") from None
-    if array.dtype.kind == "O" or array.dtype.kind not in "biuf":
+    if array.dtype.kind not in "biuf":
         found = KINDS.get(array.dtype.kind) if isinstance(value, (np.ndarray, list, tuple)) else None
         raise InputError(f"{name}: expected {expected}, got {found or type(value).__name__}")
     return array

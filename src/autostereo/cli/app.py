@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import os
-import signal
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -96,7 +95,6 @@ def run(arguments: Sequence[str]) -> int:
         status = _status_of(error)
     if status == 130:
         print("autostereo: interrupted", file=sys.stderr)
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second Ctrl-C would only spoil the exit
     return int(status or 0)
 
 

@@ -78,6 +78,11 @@ class Draw:
         return self.camera.width * self.camera.height
 
 
+def channel_camera(camera: Camera, channel: int) -> Camera:
+    """The camera whose pixels are sampled where channel 0, 1 or 2 of a panel's lies: in their thirds, left to right."""
+    return replace(camera, shift=((1 - channel) / 3, 0.0), spread=1 / 3)
+
+
 def small_camera(draw: Draw) -> Camera:
     """The camera of a panel's small views, which are scaled up: method n-pass-subres. They are sampled all over.
 
@@ -192,6 +197,13 @@ def choose_engine(scene: Scene) -> str:
     from .gl.engine import METHODS
 
     return "gl" if all(type(item) in METHODS for item in scene.objects) else "cpu"
+
+
+def engine_that_has(method: str) -> str | None:
+    """The engine that draws by a method of its own, found without starting it; None where there is none."""
+    from .gl.engine import METHODS
+
+    return "gl" if any(method in names for names in METHODS.values()) else None
 
 
 def get_engine(name: str, scene: Scene | None = None) -> Engine:

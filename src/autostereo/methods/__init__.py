@@ -9,7 +9,7 @@ from __future__ import annotations
 from types import ModuleType
 
 from ..checks import shown
-from ..engines.engine import Engine
+from ..engines.engine import Engine, engine_that_has
 from ..errors import UnsupportedError
 from . import dibr, n_pass, n_pass_subres, single_pass
 
@@ -21,9 +21,6 @@ METHODS: dict[str, ModuleType] = {
 }
 
 
-GL = "gl"
-
-
 def get_method(name: str, engine: Engine) -> ModuleType:
     """Return the schedule called `name`, which has draw_views and draw_panel, if `engine` can draw it."""
     if not isinstance(name, str):
@@ -31,13 +28,7 @@ def get_method(name: str, engine: Engine) -> ModuleType:
     if name in getattr(engine, "own_methods", ()):
         return single_pass
     if name not in METHODS or name not in engine.methods:
-        hint = f"; engine {GL} has it (--engine {GL})" if engine.name != GL and name in _methods_of_gl() else ""
+        other = engine_that_has(name)
+        hint = "" if other in (None, engine.name) else f"; engine {other} has it (--engine {other})"
         raise UnsupportedError(f"method {name!r}: the {engine.name} engine has {', '.join(engine.methods)}{hint}")
     return METHODS[name]
-
-
-def _methods_of_gl() -> list[object]:
-    """Names of its methods, without starting it."""
-    from ..engines.gl.engine import METHODS as BY_KIND
-
-    return [name for names in BY_KIND.values() for name in names]

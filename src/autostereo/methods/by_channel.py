@@ -13,10 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from ..engines.engine import Draw, Engine, Target
+from ..engines.engine import Draw, Engine, Target, channel_camera
 
 DrawPanel = Callable[[Engine, Any, Draw, Target], None]
-THIRD = 1 / 3
 
 
 def by_channel(draw_panel: DrawPanel) -> DrawPanel:
@@ -44,5 +43,5 @@ def held_by_channel(draw: Draw) -> int:
 
 def of_channel(draw: Draw, channel: int) -> Draw:
     """The draw whose pixels are sampled where channel 0, 1 or 2 of a panel's pixels lies."""
-    camera = replace(draw.camera, shift=((1 - channel) * THIRD, 0.0), spread=THIRD)
+    camera = channel_camera(draw.camera, channel)
     return replace(draw, camera=camera, options=replace(draw.options, sampling="pixel"))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import UnsupportedError
-from ..engine import Draw, Target, small_camera
+from ..engine import Draw, Target, channel_camera, small_camera
 from ..gathering import Tiles
 from .atlas import Atlas, Layout
 from .blocks import stored_background
@@ -249,12 +249,14 @@ def _gather_channels(job: Job, stages: list[Stage], panel: Panel, sample: tuple[
 
 def _weave_small(job: Job, stages: list[Stage], panel: Panel) -> None:
     """Small views, scaled up while they are woven (Hübner 2007a, section 2.3), as methods/n_pass_subres.py has it."""
-    own = job.draw.options.sampling == "subpixel"
+    draw = job.draw
+    own = draw.options.sampling == "subpixel"
     panel.clear()
-    for column, channels in [((1 - c) / 3, CHANNELS[c]) for c in range(3)] if own else [(0.0, ALL)]:
-        moved = replace(job.draw, camera=replace(job.draw.camera, shift=(column, 0.0)))
-        small = small_camera(moved)
-        for part in atlases(replace(job, draw=replace(job.draw, camera=small)), "small atlas"):
+    for camera, channels in (
+        [(channel_camera(draw.camera, c), CHANNELS[c]) for c in range(3)] if own else [(draw.camera, ALL)]
+    ):
+        small = small_camera(replace(draw, camera=camera))
+        for part in atlases(replace(job, draw=replace(draw, camera=small)), "small atlas"):
             _draw_samples(part, stages)
             layout = part.atlas.layout
             tiles = Tiles(layout.columns, small.width, small.height, *layout.size, 4)
