@@ -100,7 +100,7 @@ def _save_mp4(path: Path, views: ViewStack, fps: float) -> Path:
         raise DependencyError(f"{path}: mp4 needs PyAV; pip install autostereo[video]") from error
 
     try:
-        return write_atomic(path, lambda file: _encode(file, _even_frames(views), fps))
+        return write_atomic(path, lambda file: _encode(file, views, fps))
     except av.error.FFmpegError as error:
         raise FileError(f"{path}: cannot be written as mp4 ({error.strerror or error})") from error
 
@@ -112,12 +112,11 @@ def _even_frames(views: ViewStack) -> Iterator[NDArray[np.uint8]]:
         yield np.ascontiguousarray(np.pad(views.color[k, ..., :3], padding, mode="edge"))
 
 
-def _encode(file: BinaryIO, frames: Iterator[NDArray[np.uint8]], fps: float) -> None:
-    """Write frames (H, W, 3) of even size as MP4, BT.709."""
+def _encode(file: BinaryIO, views: ViewStack, fps: float) -> None:
+    """Write one loop of the views as MP4, BT.709."""
     import av
 
-    first = next(frames)
-    height, width = first.shape[:2]
+    height, width = views.height + views.height % 2, views.width + views.width % 2
     large = height * width > H264_PIXELS or max(height, width) > H264_SIDE
     codec = "libx265" if large else "libx264"
     if codec not in av.codecs_available:
@@ -125,13 +124,16 @@ def _encode(file: BinaryIO, frames: Iterator[NDArray[np.uint8]], fps: float) -> 
     with av.open(file, mode="w", format="mp4") as container:
         stream: Any = container.add_stream(codec, rate=Fraction(fps).limit_denominator(1001))
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
-        stream.options = {"crf": "18"} | ({"x265-params": "log-level=error"} if large else {})
+        stream.options = {"crf": "18"}
+        if large:
+            # x265 sets no decoding times before its third frame, so shorter loops do without B frames, which need them
+            stream.options["x265-params"] = "log-level=error" + (":bframes=0" if views.views < 3 else "")
         context = stream.codec_context
         context.colorspace = context.color_primaries = context.color_trc = 1  # BT.709
         context.color_range = 1  # 16…235, as yuv420p is understood
         if large:
             context.codec_tag = "hvc1"  # Apple's players know no other
-        for pixels in (first, *frames):
+        for pixels in _even_frames(views):
             frame = av.VideoFrame.from_ndarray(pixels, format="rgb24")
             container.mux(stream.encode(frame.reformat(format="yuv420p", dst_colorspace="ITU709")))
         container.mux(stream.encode())
