@@ -64,3 +64,17 @@ def test_eye_needs_a_display_with_a_size(cli: Run, folder: Path) -> None:
     result = cli("observe", "p.png", *LENSES, "--eye", "0,500", "-o", "seen.png")
     refused(result, "lenticular-8 has none; give a .toml of your own with size_mm below [optics], or --view U")
     assert "physical" not in result.err
+
+
+def test_options_that_nothing_in_the_picture_asks_for_are_named(cli: Run, folder: Path) -> None:
+    render = ("render", "square.off", *LENSES, *SMALL, "-o", "p.png")
+    result = cli(*render, "--references", "3", "--step", "0.5", "--small-size", "8x8", "--alpha", "averaged")
+    assert result.status == 0 and "without effect here: --step, --small-size, --references\n" in result.err
+    assert "without effect" not in cli(*render, "--method", "n-pass-subres", "--small-size", "8x8").err
+    assert "without effect" not in cli(*render, "--method", "dibr", "--references", "3").err
+    views = ("views", "square.off", "--views", "2", "--size", "16x16", "-o", "v.npz")
+    assert "without effect here: --volume\n" in cli(*views, "--volume", "exact").err
+    quilt = ("quilt", "square.off", "--grid", "2x1", "--view-size", "8x8", "-o", "q.png")
+    assert "without effect here: --references\n" in cli(*quilt, "--references", "1").err
+    np.save("v.npy", np.ones((3, 3, 3), np.uint8))
+    assert "without effect" not in cli("views", "v.npy", *views[2:], "--volume", "exact", "--step", "0.5").err

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -190,6 +190,24 @@ def working(text: str, total: int | None = None) -> Iterator[Callable[[], None]]
 def note_compilation() -> None:
     """Say that kernels are being compiled, when they are."""
     note("compiling kernels (once for each kind of picture, up to a minute)…")
+
+
+def note_idle(options: Options, scene: Scene, method: str) -> None:
+    """Name the options that were given and that nothing in this picture asks for."""
+    volumes, points = (any(type(item).__name__ == kind for item in scene.objects) for kind in ("Volume", "Points"))
+    used = {
+        "step": volumes,
+        "volume": volumes,
+        "alpha": method in ("single-pass", "covering-quad"),
+        "views_per_pass": method.startswith("geometry-shader"),
+        "small_size": method == "n-pass-subres",
+        "groups": points and method == "covering-quad" and options.alpha != "exact",
+        "references": method == "dibr",
+    }
+    given = [field for field in fields(options) if getattr(options, field.name) != field.default]
+    idle = [f"--{field.name.replace('_', '-')}" for field in given if not used.get(field.name, True)]
+    if idle:
+        note(f"without effect here: {', '.join(idle)}")
 
 
 def note_reuse(picture: Any, draw: Callable[..., Any], options: Options) -> None:

@@ -80,6 +80,7 @@ def quilt(
     path = outputs.check_image(quilt_path(_place(output, f"{common.stem(inputs[0])}.png"), layout))
     outputs.check_apart(path, *inputs)
     scene = common.load_scene(inputs, background, volumes)
+    common.note_idle(options, scene, method)
     rig = _frame(scene, where, layout, side) if rig is None else rig.with_views(layout.views)
     if rig.aspect is None:
         rig = replace(rig, aspect=layout.aspect)

@@ -71,6 +71,7 @@ def render(
     path = outputs.check_image(output or Path(own))
     outputs.check_apart(path, *inputs)
     scene = common.load_scene(inputs, background, volumes)
+    common.note_idle(options, scene, method)
 
     from ..display.rig import Rig
     from ..render import render as draw

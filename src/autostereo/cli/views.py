@@ -96,6 +96,7 @@ def views(
     outputs.check_output(path, (suffix,) if suffix else ())
     outputs.check_apart(path, *inputs)
     scene = common.load_scene(inputs, background, volumes)
+    common.note_idle(options, scene, method)
     rig = common.frame_views(scene, rig, views, pixels, display, side)
     if lens is not None:
         options = replace(options, aperture=rig.focal / 50 if aperture is None else aperture, lens=samples_of_lens)
