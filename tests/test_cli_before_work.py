@@ -41,5 +41,7 @@ def test_bench_plots_go_into_a_folder(cli: Run, folder: Path, monkeypatch: pytes
     assert not Path("charts").exists()
 
 
-def test_simulated_numbers_of_views_come_once(cli: Run, folder: Path) -> None:
+def test_simulated_numbers_of_views_and_machines_come_once(cli: Run, folder: Path) -> None:
     refused(cli("simulate", "level", "-n", "1,4,1"), "--views: expected each number once, got '1,4,1'")
+    same = ("-m", "scanline", "-m", "scanline")
+    refused(cli("simulate", "level", *same), "--machine: expected machines of different names, got scanline, scanline")

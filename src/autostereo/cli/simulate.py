@@ -69,6 +69,9 @@ def simulate(
 
     names = machine or (LENS_DEFAULTS if lens else DEFAULTS)
     machines = [Machine.load(name) for name in names]
+    called = [one.name for one in machines]
+    if len(set(called)) < len(called):
+        raise InputError(f"--machine: expected machines of different names, got {', '.join(called)}")
     counts = _counts(views)
     pixels = common.parse_size(size) if size else study.SIZE
     check_size(max(counts), pixels)
