@@ -29,7 +29,7 @@ from .mesh_setup import (
     turn_normals,
 )
 from .mesh_views import draw_views
-from .panel_lines import BUCKET, LinePlan, line_capacity, plan_lines
+from .panel_lines import LinePlan, line_buckets, line_capacity, plan_lines
 from .panel_list import STRIDE, Block
 from .scene_arrays import SceneArrays, background_word, light_array, scene_arrays
 from .simd import LANES
@@ -99,12 +99,12 @@ def draw_mesh_panel(prepared: PreparedMeshes, draw: Draw, target: Target, memory
     surface, camera, shader = surface_at(prepared, draw, columns, blocks, memory)
     side = round(draw.options.samples**0.5)
     panel = Panel(plan, draw.flip_x, draw.flip_y, draw.options.sampling == "subpixel")
-    samples, capacity = columns * 3 + LANES, line_capacity(plan, columns)
+    samples = columns * 3 + LANES
     sums = samples if side > 1 else 0
     exact = (len(shader.exact), width)
     pool = memory.pool(
-        ("panel", columns, capacity, sums, exact),
-        lambda: (new_block(1, columns, capacity), new_scratch(samples, sums, exact)),
+        ("panel", columns, line_capacity(plan, columns), line_buckets(plan, columns), sums, exact),
+        lambda: (new_block(1, columns, plan), new_scratch(samples, sums, exact)),
     )
     background = background_word(prepared.scene)
     depth = np.empty((0, 0, 0), np.float32) if target.depth is None else target.depth
@@ -148,13 +148,14 @@ def count_samples(target: Target, scratch: Scratch) -> None:
     scratch.counts[:] = 0
 
 
-def new_block(rows: int, columns: int, capacity: int) -> Block:
-    """One thread's memory for a panel's block whose rows have at most `capacity` lines."""
+def new_block(rows: int, columns: int, plan: LinePlan) -> Block:
+    """One thread's memory for a panel's block of so many pixels."""
+    capacity = line_capacity(plan, columns)
     return Block(
         np.zeros(rows * columns * 3, np.float32),
         np.zeros((rows, 3, capacity), np.float32),
         np.zeros((rows, capacity), np.int32),
-        np.zeros((rows, (columns >> BUCKET) + 2), np.int32),
+        np.zeros((rows, line_buckets(plan, columns) + 1), np.int32),
         np.zeros((3, capacity), np.float32),
         np.zeros(capacity, np.int32),
         np.zeros(columns, np.float64),

@@ -5,7 +5,9 @@ channel `period` pixels apart show nearly the same camera, which drifts slowly a
 wraps: between two jumps they form a line, x = x0 + j·period, offset = o0 + j·drift up to a known misfit. In the plane
 of x and offset a segment is bounded by two straight edges (mesh_raster), so what it covers of a line is an interval of
 j, found by two divisions (DESIGN section 7, for lenses; here one case for tables, cells, slanted lenses, any period).
-Lines only say where to look; whether a sample is covered is decided at its exact offset, `row_offsets`.
+All lines are parallel, so those that a segment may meet follow each other where they are sorted by the place at which
+they cross the middle offset. Lines only say where to look; whether a sample is covered is decided at its exact offset,
+`row_offsets`.
 """
 
 from __future__ import annotations
@@ -17,11 +19,15 @@ from numpy.typing import NDArray
 
 from ...viewmap import ViewMap, offset_at
 from .jit import inlined, kernel
+from .scalars import ZERO
 from .view_rows import MapArgs, cell_of, map_args
 
 MAX_PERIOD = 64
 NEAR_WRAP = 1e-6  # of a phase: rounding may put a sample on either side of a wrap, so both lines hold it
-BUCKET = 4  # lines are sorted by x0 into buckets of 2⁴ pixels
+BUCKET = 4  # lines are sorted into buckets of 2⁴ pixels
+PARALLAX = (-0.125, -0.0625, 0.0, 0.0625)  # panel widths: parallax between the outermost cameras to reckon with
+SEGMENT = 5.0  # pixels: width of a segment to reckon with
+LONG = 4  # panel widths: lines that cross all offsets in no less are hardly more than the residues of the period
 
 
 class LinePlan(NamedTuple):
@@ -29,8 +35,9 @@ class LinePlan(NamedTuple):
 
     map: its view map; offsets (V,) float64; period in pixels, a multiple of that of the table or the cells; step:
     phase from sample to sample, in (−½, ½], 0 for a table; first, slope: offset ≈ first + slope·phase, at most
-    `misfit` away; low, high: least and greatest offset of all; reach: length of the longest line in pixels; spacing,
-    middle: offsets are (k − middle)·spacing to the bit, or spacing is 0.
+    `misfit` away; low, high: least and greatest offset of all; lean: pixels from sample to sample per unit of offset,
+    and lead: pixels that a line takes at most to cross the middle offset; both 0 if that is far, then reach: length of
+    the longest line in pixels, else 0; spacing, middle: offsets are (k − middle)·spacing to the bit, or spacing is 0.
     """
 
     map: MapArgs
@@ -42,6 +49,8 @@ class LinePlan(NamedTuple):
     misfit: float
     low: float
     high: float
+    lean: float
+    lead: float
     reach: float
     spacing: float
     middle: float
@@ -52,18 +61,36 @@ def plan_lines(viewmap: ViewMap, width: int, flip: bool, offsets: NDArray[np.flo
     offsets = np.ascontiguousarray(offsets, dtype=np.float64)
     m = map_args(viewmap)
     if viewmap.table is not None:
-        period = viewmap.table.shape[1]
-        return LinePlan(m, offsets, period, 0.0, 0.0, 0.0, 0.0, offsets.min(), offsets.max(), float(width), 0.0, 0.0)
+        period, low, high = viewmap.table.shape[1], offsets.min(), offsets.max()
+        return LinePlan(m, offsets, period, 0.0, 0.0, 0.0, 0.0, low, high, 0.0, 0.0, float(width), 0.0, 0.0)
+    first, slope, misfit, low, high = _fit(viewmap, offsets)
+    period, step = _period(viewmap, width, -1.0 if (slope < 0.0) != flip else 1.0)
+    step = -step if flip else step
+    across = period / max(abs(step), 1e-9)  # pixels in which a line crosses all offsets
+    spacing, middle = _even(offsets)
+    if slope == 0.0 or across > LONG * width:
+        lean, lead, reach = 0.0, 0.0, min(float(width), across) + period
+    else:
+        lean = period / (slope * step)
+        lead, reach = (0.5 * (high - low) + misfit) * abs(lean), 0.0
+    return LinePlan(m, offsets, period, step, first, slope, misfit, low, high, lean, lead, reach, spacing, middle)
+
+
+def _period(viewmap: ViewMap, width: int, sign: float) -> tuple[int, float]:
+    """The period that leaves a segment the fewest lines to look at, and the phase from sample to sample.
+
+    A line moves period/step pixels while it crosses all offsets, a segment its parallax; lines lie so densely that it
+    meets |period − parallax·step| of each channel. What is seen is rather in front of the focal plane, where parallax
+    runs against `sign`, that of offsets as functions of the phase.
+    """
     cells = 2 if viewmap.cell_mode in (1, 2, 3) else 1
     periods = np.arange(cells, MAX_PERIOD + 1, cells)
-    steps = (-viewmap.a if flip else viewmap.a) * periods
+    steps = viewmap.a * periods
     steps = steps - np.round(steps)
-    best = np.argmin(periods + np.abs(steps) * (width / 8))
-    period, step = int(periods[best]), float(steps[best])
-    first, slope, misfit, low, high = _fit(viewmap, offsets)
-    reach = min(float(width), period / max(abs(step), 1e-9)) + period
-    spacing, middle = _even(offsets)
-    return LinePlan(m, offsets, period, step, first, slope, misfit, low, high, reach, spacing, middle)
+    parallax = sign * width * np.array(PARALLAX)
+    met = np.abs(periods - parallax[:, None] * steps).mean(axis=0) + np.abs(steps) * SEGMENT
+    best = np.argmin(met)
+    return int(periods[best]), float(steps[best])
 
 
 def _even(offsets: NDArray[np.float64]) -> tuple[float, float]:
@@ -91,6 +118,11 @@ def _fit(viewmap: ViewMap, offsets: NDArray[np.float64]) -> tuple[float, float, 
     first += 0.5 * (error.min() + error.max())
     misfit = 0.5 * float(np.ptp(error)) + 1e-5 * float(np.ptp(shown))
     return float(first), float(slope), misfit, float(shown.min()), float(shown.max())
+
+
+def line_buckets(plan: LinePlan, columns: int) -> int:
+    """Buckets of the lines in a row of so many pixels."""
+    return (columns + 2 * int(np.ceil(plan.lead)) >> BUCKET) + 1
 
 
 def line_capacity(plan: LinePlan, columns: int) -> int:
@@ -156,22 +188,36 @@ def row_offsets(row, width, flip, columns, base, x0, plane, plan, u, out):
 
 
 @inlined
+def bucket_at(x, plan, x0, buckets):
+    """The bucket of lines that cross the middle offset at pixel x, the first or last where that is far away."""
+    place = (x - np.float32(x0)) + np.float32(plan.lead)
+    return np.int64(min(max(place, ZERO), np.float32((buckets << BUCKET) - 1))) >> BUCKET
+
+
+@inlined
+def bucket_of(x, offset, plan, x0, buckets):
+    """The bucket of a line through pixel x at a camera offset."""
+    middle = np.float32(0.5 * (plan.low + plan.high))
+    return bucket_at(x - (offset - middle) * np.float32(plan.lean), plan, x0, buckets)
+
+
+@inlined
 def add_line(n, j0, j1, x, address, offset, drift, plan, x0, starts, found, found_ints):
     """Remember samples j0 … j1 of a line that begins at pixel x, and count it in its bucket."""
     found[0, n] = np.float32(x + j0 * plan.period)
     found[1, n] = np.float32(j1 - j0 + 1)
     found[2, n] = np.float32(offset + j0 * drift)
     found_ints[n] = address + j0 * plan.period
-    starts[((x + j0 * plan.period - x0) >> BUCKET) + 1] += 1
+    starts[bucket_of(found[0, n], found[2, n], plan, x0, starts.shape[0] - 1) + 1] += 1
     return n + 1
 
 
 @kernel
 def make_lines(row, width, flip, columns, base, x0, plane, plan, starts, lines, addresses, found, found_ints):
-    """Find the lines of pixels `columns` of a physical row, in buckets of x.
+    """Find the lines of pixels `columns` of a physical row, in buckets of where they cross the middle offset.
 
     lines (3, N) float32: pixel of the first sample, number of samples, offset of the first; addresses (N,) int32:
-    place of the first sample, see row_offsets; starts: first line of each bucket from x0 on, and after the last.
+    place of the first sample, see row_offsets; starts: first line of each bucket from x0 − lead on, and after the last.
     found, found_ints: like lines and addresses, scratch.
     """
     m, period, step = plan.map, plan.period, plan.step
@@ -207,7 +253,7 @@ def make_lines(row, width, flip, columns, base, x0, plane, plan, starts, lines, 
     for k in range(starts.shape[0] - 1):
         starts[k + 1] += starts[k]
     for k in range(n):
-        bucket = (np.int64(found[0, k]) - x0) >> BUCKET
+        bucket = bucket_of(found[0, k], found[2, k], plan, x0, starts.shape[0] - 1)
         place = starts[bucket]
         starts[bucket] += 1
         lines[0, place], lines[1, place], lines[2, place] = found[0, k], found[1, k], found[2, k]

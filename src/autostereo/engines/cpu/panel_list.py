@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined
-from .panel_lines import BUCKET
-from .scalars import ONE, ZERO
+from .panel_lines import bucket_at
+from .scalars import HALF, ONE, ZERO
 from .simd import (
     LANES,
     append,
@@ -114,6 +114,20 @@ def swept(ends, place):
 
 
 @inlined
+def lines_met(ends, place, starts):
+    """The lines that a stretch may meet, first and behind the last."""
+    x1, p1, x2, p2 = ends
+    plan, buckets = place.plan, starts.shape[0] - 1
+    low, high, misfit = np.float32(plan.low), np.float32(plan.high), np.float32(plan.misfit)
+    lean, middle, half = np.float32(plan.lean), HALF * (low + high), HALF * (high - low) + misfit
+    left = x1 + middle * p1 - half * abs(p1 - lean) - misfit * abs(p1) - np.float32(plan.reach)
+    right = x2 + middle * p2 + half * abs(p2 - lean) + misfit * abs(p2)
+    first = bucket_at(left - np.float32(2.0), plan, place.first, buckets)
+    last = bucket_at(right + ONE, plan, place.first, buckets)
+    return np.int64(starts[first]), np.int64(starts[last + 1])
+
+
+@inlined
 def draw_stretch(draw_listed, place, row, ends, what, scratch):
     """List the samples of a row that a stretch x1 + o·p1 ≤ x < x2 + o·p2 may cover; ends = (x1, p1, x2, p2).
 
@@ -132,8 +146,7 @@ def draw_stretch(draw_listed, place, row, ends, what, scratch):
     both = np.int32(below1) + np.int32(below2) - np.int32(1)
     if below2 and not below1:
         first, second = second, first
-    line = np.int64(starts[np.int64(max(left - np.float32(plan.reach), ZERO)) >> BUCKET])
-    stop = np.int64(starts[(np.int64(right) >> BUCKET) + 1])
+    line, stop = lines_met(ends, place, starts)
     n, word, k = np.uint64(0), np.int32(0), np.int32(0)
     run, address = splat(np.int32(0)), splat(np.int32(0))
     last = splat(np.int32(row * 3 * place.columns))

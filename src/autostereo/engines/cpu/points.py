@@ -16,7 +16,7 @@ from .memory import Memory
 from .mesh import new_block, panel_lines
 from .mesh_panel import Panel
 from .mesh_setup import CameraNumbers, camera_numbers
-from .panel_lines import line_capacity
+from .panel_lines import line_buckets, line_capacity
 from .panel_list import STRIDE
 from .points_block import Splats
 from .points_panel import PLANE as PANEL_PLANE
@@ -101,10 +101,9 @@ def draw_points_panel(
     plan, camera, grid = panel_lines(draw, buffers), camera_numbers(draw.camera), panel_grid(width, height)
     splats = splats_at(arrays, scene, draw, (camera, grid), buffers, (plan.low, plan.high))
     panel = Panel(plan, draw.flip_x, draw.flip_y, draw.options.sampling == "subpixel")
-    capacity = line_capacity(plan, grid.columns)
     pool = buffers.pool(
-        ("points panel", grid, capacity),
-        lambda: (new_block(grid.rows, grid.columns, capacity), new_scratch(PANEL_PLANES * int(PANEL_PLANE))),
+        ("points panel", grid, line_capacity(plan, grid.columns), line_buckets(plan, grid.columns)),
+        lambda: (new_block(grid.rows, grid.columns, plan), new_scratch(PANEL_PLANES * int(PANEL_PLANE))),
     )
 
     def task(first: int, end: int) -> None:
