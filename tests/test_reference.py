@@ -206,6 +206,19 @@ def test_of_equally_near_triangles_the_earlier_wins(order):
     np.testing.assert_array_equal(joined, color)
 
 
+@pytest.mark.parametrize("order", [(0, 1, 2), (1, 2, 0), (2, 1, 0)])
+def test_of_a_triangle_and_its_copy_from_another_corner_the_earlier_wins(order):
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        corners = rng.normal(size=(3, 3)) - (0, 0, 6)
+        pair = [
+            Mesh(corners[list(k)], [[0, 1, 2]], colors=np.full((3, 3), c), material=replace(FLAT, two_sided=True))
+            for k, c in (((0, 1, 2), 0.25), (order, 0.75))
+        ]
+        color, _ = draw_views(pair, offsets=(-0.5, 0.0, 0.5))
+        assert set(np.unique(color[color[..., 3] > 0][:, 0])) <= {64}
+
+
 def test_nearer_surface_hides_and_interpenetration_follows_depth():
     wall = quad(-9, 9, -9, 9, 4.0, colors=np.tile([1.0, 0, 0], (4, 1)))
     leaning = Mesh(

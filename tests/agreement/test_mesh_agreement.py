@@ -162,6 +162,24 @@ def test_of_equally_near_triangles_the_earlier_is_seen_as_in_the_reference(engin
     np.testing.assert_array_equal(views(scene, RIG, engine).color, views(alone, RIG, engine).color)
 
 
+@pytest.mark.parametrize("depth", [4.0, 3.0, 1 / 3, 7.7])
+def test_of_triangles_in_one_plane_before_the_cameras_the_earlier_is_seen(engine, depth):
+    """They share no edge, so that only equal depths in all of them make the first win everywhere."""
+    need(engine)
+    material = aus.Material(1, 0, two_sided=True)
+    first, second = (
+        aus.Mesh(np.array(corners) * depth / 4, [[0, 1, 2]], colors=np.tile(color, (3, 1)), material=material)
+        for corners, color in (
+            ([(-1, -1, 0), (1, -0.9, 0), (0.1, 1, 0)], (1.0, 0, 0)),
+            ([(-0.8, -1.2, 0), (1.2, -0.7, 0), (-0.2, 0.9, 0)], (0, 1.0, 0)),
+        )
+    )
+    rig = aus.Rig(position=(0, 0, depth), views=3, baseline=0.2 * depth)
+    both, alone = (aus.render_views(meshes, rig, (120, 120), engine=engine) for meshes in ([first, second], first))
+    covered = alone.color[..., 3] == 255
+    assert covered.sum() > 10_000 and (both.color[..., 0] == alone.color[..., 0]).all()
+
+
 # --- single pass = n passes --------------------------------------------------------------------------
 
 

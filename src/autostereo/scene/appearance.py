@@ -17,6 +17,8 @@ ROUNDING = 1e-6  # of colours that were calculated in float32
 class Material:
     """Blinn–Phong reflection: C = kd·(ambient + diffuse·Σ L·max(N·L, 0)) + specular·Σ L·max(N·H, 0)^shininess.
 
+    A light behind the surface, N·L ≤ 0, makes no highlight.
+
     Parameters
     ----------
     ambient, diffuse, specular : float

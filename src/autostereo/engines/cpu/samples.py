@@ -14,11 +14,13 @@ from .simd import (
     LANES,
     bits,
     first_fours,
+    greater,
     high_halves,
     high_pairs,
     iota,
     keep_greater,
     last_fours,
+    lesser,
     low_halves,
     low_pairs,
     select,
@@ -37,7 +39,8 @@ def hit(x, offset, ends, depths):
     """Which of eight samples a segment covers from the cameras at `offset`, inverse depths, perspective parameters.
 
     With w = right − left and n = x − left: 1/depth = z1 + (n/w)·(z2 − z1) = q/w for q = z1·w + n·(z2 − z1), and
-    the parameter is u = n·z2/q; one division serves both. Every draw uses this one expression.
+    the parameter is u = n·z2/q; one division serves both. Every draw uses this one expression. Kept between its ends, a
+    segment that all cameras see at one depth has no other, and coplanar ones tie.
     """
     x1, p1, x2, p2 = ends
     z1, z2 = depths
@@ -47,7 +50,8 @@ def hit(x, offset, ends, depths):
     n = x - left
     q = w * z1 + n * (z2 - z1)
     r = ONE / (w * q)
-    return (left <= x) & (x < right), q * q * r, n * z2 * (w * r)
+    z = lesser(greater(q * q * r, min(z1, z2)), max(z1, z2))
+    return (left <= x) & (x < right), z, n * z2 * (w * r)
 
 
 @inlined

@@ -223,6 +223,8 @@ def pixel_box(corners: Array, camera: Camera, samples: Samples) -> Box | None:
 def trace(corners: Array, sides: NDArray[np.int64], camera: Camera, samples: Samples) -> Hits:
     """Which triangle each sample sees: the nearest at d ≥ near, the earlier of equally near ones.
 
+    Depths are compared as float32, as they are handed out: the last bits of float64 depend on the order of the corners.
+
     Parameters
     ----------
     corners : ndarray of shape (F, 3, 3)
@@ -232,7 +234,7 @@ def trace(corners: Array, sides: NDArray[np.int64], camera: Camera, samples: Sam
     camera : Camera
     samples : Samples
     """
-    depth = np.full(samples.x.shape, np.inf)
+    depth, nearest = np.full(samples.x.shape, np.inf), np.full(samples.x.shape, np.inf, np.float32)
     triangle = np.full(samples.x.shape, -1)
     side = np.zeros(samples.x.shape, dtype=np.int64)
     for index, corner in enumerate(corners):
@@ -244,9 +246,9 @@ def trace(corners: Array, sides: NDArray[np.int64], camera: Camera, samples: Sam
             inside = covers(s, e, e_dx, e_dy)
             e0, e1, e2 = np.moveaxis(e[inside], -1, 0)
             d = (e0 * corner[0, 2] + e1 * corner[1, 2] + e2 * corner[2, 2]) / (e0 + e1 + e2)
-            wins = (d >= camera.near) & (d < depth[box][inside])
+            wins = (d >= camera.near) & (d.astype(np.float32) < nearest[box][inside])
             inside[inside] = wins
-            depth[box][inside] = d[wins]
+            depth[box][inside] = nearest[box][inside] = d[wins]
             triangle[box][inside] = index
             side[box][inside] = s
     where = np.nonzero(triangle >= 0)
