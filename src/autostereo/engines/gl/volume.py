@@ -41,10 +41,11 @@ from .panel import EVERYTHING, NOTHING, Panel, write_only
 from .programs import Defines, put
 from .volume_data import TABLE, Look, is_shaded, make_table, place_in, send, table_range
 from .volume_slices import slices_on_panel, slices_on_tiles
-from .volume_space import most_half_spaces, placing
+from .volume_space import most_half_spaces, pixel_in, placing
 
 TOGETHER = 4  # volumes that compose in one march: each takes three of the 16 texture units that there are at least
-NEAR, NEAR_UNLIT = 0.75, 0.25  # voxels that a shared lookup may be beside a ray
+NEAR, NEAR_UNLIT = 0.75, 0.25  # voxels that a shared lookup may be beside a ray,
+PIXELS = 2.0  # and pixels, for where voxels are large
 FEW_COLUMNS, MOST_COLUMNS = 4, 16  # of a table that is sorted: a ray a fragment, three rays
 LENGTHS = 8  # lengths of slabs per doubling, for which tables are made
 SHADERS = {
@@ -195,9 +196,10 @@ class Rays(Stage):
         count = range(len(group))
         put(program, voxels=[VOXELS + k for k in count], emptiness=[EMPTY + k for k in count])
         shared = job.draw.options.volume == "shared" and group[0].mode == "composite"
-        near = NEAR if any(is_shaded(v) for v in group) else NEAR_UNLIT
+        places = placing(group, job.draw.camera)
+        near = min(NEAR if any(is_shaded(v) for v in group) else NEAR_UNLIT, PIXELS * pixel_in(places, job.draw.camera))
         put(program, slices=(slices.first, slices.distance, slices.slabs), share_within=near if shared else -1.0)
-        put(program, **placing(group, job.draw.camera))
+        put(program, **places)
         materials = [v.material for v in group]
         lit = [(m.ambient, m.diffuse, m.specular, m.shininess) for m in materials]
         unlit = (1.0, 0.0, 0.0, 0.0)

@@ -31,6 +31,12 @@ def placing(volumes: list[Volume], camera: Camera) -> dict[str, Any]:
     }
 
 
+def pixel_in(places: dict[str, Any], camera: Camera) -> float:
+    """Voxels that a pixel is wide in the middle of the volumes that were placed."""
+    depth = max(float(np.mean([corners[:, 2] for corners in places["corners"]])), camera.near)
+    return float(places["along"]) * depth / camera.fx
+
+
 def most_half_spaces(volumes: list[Volume]) -> int:
     """Half-spaces of the volume that has most."""
     return max(len(half_spaces(v)) for v in volumes)
