@@ -204,6 +204,13 @@ def test_bad_obj(tmp_path, text, word):
     refused(obj(tmp_path, text), word)
 
 
+def test_a_byte_order_mark_hides_neither_the_library_nor_its_first_material(tmp_path):
+    path = obj(tmp_path, SQUARE + "usemtl a\nf 1 2 3 4\n", "newmtl a\nKd 1 0 0\n")
+    for file in (path, tmp_path / "a.mtl"):
+        file.write_text(file.read_text(), encoding="utf-8-sig")
+    np.testing.assert_array_equal(only(path).colors, [(1, 0, 0)] * 4)
+
+
 def test_bad_mtl(tmp_path):
     text = SQUARE + "usemtl a\nf 1 2 3 4\n"
     refused(obj(tmp_path, text, "newmtl a\nKd red\n"), "a.mtl: expected numbers for Kd, found 'red'")

@@ -14,7 +14,7 @@ from ..errors import FileError
 from ..scene.appearance import Material
 from ..scene.mesh import Mesh
 from ..scene.points import Points
-from .files import PathLike, numbers, read_bytes, whole_numbers
+from .files import PathLike, numbers, read_text, whole_numbers
 from .image import read_image
 from .mesh import usable_normals
 from .points import make_points
@@ -76,7 +76,7 @@ def load_obj(path: PathLike) -> list[Mesh] | list[Points]:
     UserWarning
         A material library or a material does not exist; its faces are drawn white.
     """
-    text = _statements(read_bytes(path))
+    text = _statements(read_text(path))
     if not text.f:
         if not text.v:
             raise FileError(f"{path}: is not an OBJ file, it has no vertices")
@@ -269,7 +269,7 @@ def _read_mtl(path: Path) -> dict[bytes, _Surface]:
     """Materials of one MTL file by name."""
     surfaces: dict[bytes, _Surface] = {}
     surface, content = _Surface(), False
-    for line in read_bytes(path).splitlines():
+    for line in read_text(path).splitlines():
         word, _, rest = line.strip().replace(b"\t", b" ").partition(b" ")
         words = rest.split()
         key = word.lower()
