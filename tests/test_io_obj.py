@@ -185,6 +185,8 @@ def test_a_missing_or_damaged_texture_is_named_with_the_file_that_asks(tmp_path)
     ("text", "word"),
     [
         ("nothing here\n", "is not an OBJ file"),
+        (SQUARE + "vn 0 0 1\n" * 4, "has no triangles, its 4 vertices are in no face"),
+        (SQUARE + "l 1 2\np 3\n", "has no triangles, its 4 vertices are in no face"),
         (SQUARE + "f 1 2\n", "fewer than three corners"),
         (SQUARE + "f 1 2 5\n", "asks for vertex 5, the file has 4"),
         (SQUARE + "f 0 1 2\n", "vertex 0"),

@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 from ..errors import FileError
 from ..scene.appearance import Material
 from ..scene.mesh import Mesh
-from ..scene.points import Points
 from .files import PathLike, numbers, read_text, whole_numbers
 from .image import read_image
 from .mesh import usable_normals
-from .points import make_points
 from .polygons import triangulate, weld
 
 # options of map_Kd and how many words follow them; the file name is what comes after
@@ -59,8 +57,8 @@ class _Text:
     libraries: list[bytes] = field(default_factory=list)
 
 
-def load_obj(path: PathLike) -> list[Mesh] | list[Points]:
-    """Read an OBJ file: one Mesh for each material (in the order of first use), or Points where it has no faces.
+def load_obj(path: PathLike) -> list[Mesh]:
+    """Read an OBJ file: one Mesh for each material, in the order of first use.
 
     Polygons are cut into triangles; lines, points, groups and smoothing groups are ignored. Where the file has
     no normals, they are computed over the whole file, so that a border between materials stays smooth.
@@ -80,9 +78,7 @@ def load_obj(path: PathLike) -> list[Mesh] | list[Points]:
     if not text.f:
         if not text.v:
             raise FileError(f"{path}: is not an OBJ file, it has no vertices")
-        positions, colors = _vertices(text.v, path)
-        given = _rows(text.vn, 3, path, "normals (vn)")[:, :3]
-        return [make_points(positions, given if len(given) == len(positions) else None, colors)]
+        raise FileError(f"{path}: has no triangles, its {len(text.v)} vertices are in no face (f)")
     vertices, colors = _vertices(text.v, path)
     uv = _rows(text.vt, 1, path, "texture coordinates (vt)")
     uv = np.pad(uv, ((0, 0), (0, max(0, 2 - uv.shape[1]))))[:, :2]
