@@ -145,6 +145,18 @@ def test_a_byte_order_mark_is_read_over(tmp_path, name):
     np.testing.assert_array_equal(points, np.array(THREE.split(), float).reshape(3, 3))
 
 
+@pytest.mark.parametrize("uri", ["http://x.y/z.bin", "https://x.y/a%20b.png?c=d", "HTTP://x.y/z", "ftp://x.y/z"])
+def test_gltf_does_not_read_from_the_network(tmp_path, uri):
+    (tmp_path / "a.gltf").write_text(gltf(uri))
+    refused(tmp_path / "a.gltf", f"a.gltf: needs '{uri}', expected a file beside it: uris of the network are not read")
+    tree = json.loads(gltf(INLINE)) | {"images": [{"uri": uri}], "textures": [{"source": 0}]}
+    tree["accessors"].append(tree["accessors"][0] | {"type": "VEC2"})
+    tree["meshes"][0]["primitives"][0] |= {"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": 0}
+    tree["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
+    (tmp_path / "a.gltf").write_text(json.dumps(tree))
+    refused(tmp_path / "a.gltf", f"a.gltf: needs '{uri}', expected a file beside it: uris of the network are not read")
+
+
 # --- real files ----------------------------------------------------------------------------------------
 
 
