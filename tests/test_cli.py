@@ -255,6 +255,18 @@ def test_every_preset_can_be_described(cli: Run) -> None:
         assert result.status == 0 and result.out.startswith("name "), result.err
 
 
+def test_info_says_whose_normals_they_are(cli: Run, folder: Path) -> None:
+    square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\n"
+    for faces, words in (
+        ("f 1 2 3\nf 1 3 4\n", ["computed"]),
+        ("f 1//1 2//1 3//1\nf 1//1 3//1 4//1\n", ["given"]),
+        ("usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n", ["computed", "computed"]),  # over the border between both
+        ("usemtl a\nf 1//1 2//1 3//1\nusemtl b\nf 1 3 4\n", ["given", "computed"]),
+    ):
+        (folder / "a.obj").write_text(square + faces)
+        assert re.findall(r"normals (\w+)", cli("info", "a.obj").out) == words
+
+
 def test_info(cli: Run, folder: Path) -> None:
     result = cli("info", "square.off", "-d", "looking-glass-portrait")
     assert result.status == 0

@@ -138,7 +138,9 @@ def _share_normals(
     for mesh, v in parts:
         material = replace(mesh.material, two_sided=not whole.is_closed)
         normals = whole.shading_normals[v] if mesh.normals is None else mesh.normals
-        result.append(replace(mesh, material=material, normals=normals))
+        part = replace(mesh, material=material, normals=normals)
+        object.__setattr__(part, "normals_computed", mesh.normals is None)
+        result.append(part)
     return result
 
 

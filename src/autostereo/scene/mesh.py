@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -125,6 +125,8 @@ class Mesh:
     texture: NDArray | None = None  # (h, w, 3) uint8, rows from the top
     material: Material = None  # type: ignore[assignment]  # None becomes Material()
     transform: NDArray = None  # type: ignore[assignment]  # None becomes the identity
+    # set by readers where `normals` are those of the surface that this is a part of; `replace` forgets it
+    normals_computed: bool = field(default=False, init=False, repr=False)
 
     def __post_init__(self) -> None:
         put = object.__setattr__
