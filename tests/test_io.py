@@ -1,5 +1,7 @@
 """Reading files: round trips, STL and OFF, real files, and what `load` refuses."""
 
+import base64
+import json
 import struct
 import subprocess
 import sys
@@ -12,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import autostereo as aus
-from autostereo import AutostereoError, InputError
+from autostereo import AutostereoError, InputError, Points
 from autostereo.io import LOADERS, load
 from autostereo.scene import shapes
 from io_files import DATA, needs_data, only, refused
@@ -104,6 +106,55 @@ def test_off_with_normals_colors_uv_comments_and_polygons(tmp_path):
     np.testing.assert_allclose(mesh.colors, [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.2, 0.2, 0.2)])
     path.write_text("OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")  # counts on the first line
     assert len(only(path).faces) == 1
+
+
+# --- texts --------------------------------------------------------------------------------------------
+
+THREE = "0 0 0\n1 0 0\n0 1 0\n"
+GLTF = {"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36}]}  # fmt: skip
+
+
+def gltf(uri):
+    """A triangle whose buffer is at `uri`."""
+    return json.dumps(GLTF | {"buffers": [{"byteLength": 36, "uri": uri}]})
+
+
+INLINE = "data:;base64," + base64.b64encode(np.array(THREE.split(), "<f4").tobytes()).decode()
+TEXTS = {
+    "a.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+    "a.ply": "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    f"element face 1\nproperty list uchar int vertex_index\nend_header\n{THREE}3 0 1 2\n",
+    "a.off": f"OFF\n3 1 0\n{THREE}3 0 1 2\n",
+    "a.stl": "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+    "endloop\nendfacet\nendsolid\n",
+    "a.gltf": gltf(INLINE),
+    "a.xyz": THREE,
+    "a.csv": "x,y,z\n0,0,0\n1,0,0\n0,1,0\n",
+    "a.pcd": f"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 3\nHEIGHT 1\nDATA ascii\n{THREE}",
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_a_byte_order_mark_is_read_over(tmp_path, name):
+    (tmp_path / name).write_text(TEXTS[name], encoding="utf-8-sig")
+    thing = only(tmp_path / name)
+    points = thing.positions if isinstance(thing, Points) else thing.vertices[thing.faces[0]]
+    np.testing.assert_array_equal(points, np.array(THREE.split(), float).reshape(3, 3))
+
+
+@pytest.mark.parametrize("uri", ["http://x.y/z.bin", "https://x.y/a%20b.png?c=d", "HTTP://x.y/z", "ftp://x.y/z"])
+def test_gltf_does_not_read_from_the_network(tmp_path, uri):
+    (tmp_path / "a.gltf").write_text(gltf(uri))
+    refused(tmp_path / "a.gltf", f"a.gltf: needs '{uri}', expected a file beside it: uris of the network are not read")
+    tree = json.loads(gltf(INLINE)) | {"images": [{"uri": uri}], "textures": [{"source": 0}]}
+    tree["accessors"].append(tree["accessors"][0] | {"type": "VEC2"})
+    tree["meshes"][0]["primitives"][0] |= {"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": 0}
+    tree["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
+    (tmp_path / "a.gltf").write_text(json.dumps(tree))
+    refused(tmp_path / "a.gltf", f"a.gltf: needs '{uri}', expected a file beside it: uris of the network are not read")
 
 
 # --- real files ----------------------------------------------------------------------------------------

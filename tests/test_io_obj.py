@@ -8,7 +8,7 @@ from PIL import Image
 from autostereo import Material
 from autostereo.io import load
 from autostereo.io.image import read_image
-from autostereo.io.obj import _map_name
+from autostereo.io.obj import _map
 from io_files import DATA, needs_data, only, refused
 
 MESHES = DATA / "meshes"
@@ -130,12 +130,42 @@ def test_textures_with_options_blanks_and_backslashes(tmp_path):
         (b"my file.png ", b"my file.png"),
         (b"-blendu off -mm 0 1 a.png", b"a.png"),
         (b"-o 0.5 a.png", b"a.png"),
+        (b"-bm 0.5 a.png", b"a.png"),
+        (b"-mm -0.1 2 a.png", b"a.png"),
+        (b"-clamp on a.png", b"a.png"),
+        (b"-t 1 2 3 a.png", b"a.png"),
+        (b"-t 1 a.png", b"a.png"),
+        (b"-blendu on -blendv off a.png", b"a.png"),
+        (b"-imfchan r a.png", b"a.png"),
+        (b"-texres 512 a.png", b"a.png"),
+        (b"-cc on -boost 1.5 a.png", b"a.png"),
+        (b"-type sphere a.png", b"a.png"),
         (b"-o 0.5 0 0 -s 1 1 1  -bm 2 a b.png", b"a b.png"),
         (b'"quoted name.png"', b"quoted name.png"),
     ],
 )
 def test_file_names_behind_map_options(line, name):
-    assert _map_name(line) == name
+    assert _map(line, "a.mtl")[0] == name
+
+
+@pytest.mark.parametrize(
+    ("options", "scale", "offset"),
+    [
+        ("", (1, 1), (0, 0)),
+        ("-s 2 3 1 -o .25 .5 0", (2, 3), (0.25, 0.5)),
+        ("-o .25 .5 -mm 0 1 -s 2 3", (2, 3), (0.25, 0.5)),
+        ("-s 2 -bm 3 -t 5 5 5", (2, 1), (0, 0)),
+        ("-O -.5 -clamp on", (1, 1), (-0.5, 0)),
+    ],
+)
+def test_scale_and_offset_of_a_texture_move_its_coordinates(tmp_path, options, scale, offset):
+    Image.new("RGB", (2, 2)).save(tmp_path / "a.png")
+    mtl = f"newmtl plain\nmap_Kd a.png\nnewmtl moved\nmap_Kd {options} a.png\n"
+    text = SQUARE + UV + "usemtl plain\nf 1/1 2/2 3/3\nusemtl moved\nf 1/1 3/3 4/4\n"
+    plain, moved = load(obj(tmp_path, text, mtl)).objects
+    np.testing.assert_array_equal(plain.uv, plain.vertices[:, :2])
+    np.testing.assert_array_equal(moved.uv, moved.vertices[:, :2] * scale + offset)
+    assert moved.texture is plain.texture
 
 
 def test_reflection_follows_the_illumination_model(tmp_path):
@@ -185,6 +215,8 @@ def test_a_missing_or_damaged_texture_is_named_with_the_file_that_asks(tmp_path)
     ("text", "word"),
     [
         ("nothing here\n", "is not an OBJ file"),
+        (SQUARE + "vn 0 0 1\n" * 4, "has no triangles, its 4 vertices are in no face"),
+        (SQUARE + "l 1 2\np 3\n", "has no triangles, its 4 vertices are in no face"),
         (SQUARE + "f 1 2\n", "fewer than three corners"),
         (SQUARE + "f 1 2 5\n", "asks for vertex 5, the file has 4"),
         (SQUARE + "f 0 1 2\n", "vertex 0"),
@@ -204,9 +236,17 @@ def test_bad_obj(tmp_path, text, word):
     refused(obj(tmp_path, text), word)
 
 
+def test_a_byte_order_mark_hides_neither_the_library_nor_its_first_material(tmp_path):
+    path = obj(tmp_path, SQUARE + "usemtl a\nf 1 2 3 4\n", "newmtl a\nKd 1 0 0\n")
+    for file in (path, tmp_path / "a.mtl"):
+        file.write_text(file.read_text(), encoding="utf-8-sig")
+    np.testing.assert_array_equal(only(path).colors, [(1, 0, 0)] * 4)
+
+
 def test_bad_mtl(tmp_path):
     text = SQUARE + "usemtl a\nf 1 2 3 4\n"
     refused(obj(tmp_path, text, "newmtl a\nKd red\n"), "a.mtl: expected numbers for Kd, found 'red'")
+    refused(obj(tmp_path, text, "newmtl a\nmap_Kd -s 1 inf a.png\n"), "a.mtl: expected finite numbers for map_Kd -s")
     refused(obj(tmp_path, text, "newmtl a\nKd nan 0 0\n"), "a.mtl: expected finite numbers for Kd")
     refused(obj(tmp_path, text, "\x89PNG\r\n\x1a\n\x00\x00"), "a.mtl: is not a library of materials (MTL)")
 

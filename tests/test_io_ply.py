@@ -5,11 +5,14 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from PIL import Image
 
 from autostereo import FileError
 from autostereo.io import load
 from autostereo.io.ply import Ragged, read_ply
+from autostereo.io.polygons import unroll_strips
 from io_files import only, refused
 
 
@@ -22,6 +25,7 @@ def ply(tmp_path, header, body, kind="ascii", newline="\n"):
 
 VERTEX = ["element vertex 4", "property float x", "property float y", "property float z"]
 FACE = ["element face 2", "property list uchar int vertex_indices"]
+STRIPS = ["element tristrips 2", "property list int int vertex_indices"]
 POINTS = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
 
 
@@ -84,6 +88,40 @@ def test_ply_wedge_uv_and_texture_file(tmp_path):
         load(path)
 
 
+STRIP_FILE = "9 0 1 3 2 -1 1 2 3 -1\n6 0 1 1 2 3 3\n"
+UNROLLED = [(0, 1, 3), (1, 2, 3), (1, 2, 3), (1, 2, 3)]  # the second list: 0 1 1, 1 2 1 and 2 3 3 are no triangles
+
+
+@pytest.mark.parametrize("kind", ["ascii", "binary_big_endian"])
+def test_ply_strips_become_triangles_beside_the_faces(tmp_path, kind):
+    def packed(text):
+        return text if kind == "ascii" else np.array(text.split(), ">i4").tobytes()
+
+    vertex = POINTS if kind == "ascii" else np.array(POINTS.split(), ">f4").tobytes()
+    mesh = only(ply(tmp_path, VERTEX + STRIPS, vertex + packed(STRIP_FILE), kind))
+    np.testing.assert_array_equal(mesh.faces, UNROLLED)
+    np.testing.assert_array_equal(mesh.shading_normals, [(0, 0, 1)] * 4)
+    face = ["element face 1", "property list int int vertex_index"]
+    for faces, own in (("4 0 1 2 3\n", [(0, 1, 2), (0, 2, 3)]), ("2 0 1\n", [])):
+        mesh = only(ply(tmp_path, VERTEX + face + STRIPS, vertex + packed(faces) + packed(STRIP_FILE), kind))
+        np.testing.assert_array_equal(mesh.faces, own + UNROLLED)
+
+
+@given(st.lists(st.lists(st.integers(-1, 5), max_size=12), max_size=5))
+def test_strips_are_unrolled_as_one_would_by_hand(lists):
+    wanted = []
+    for entries in lists:
+        strip = []
+        for entry in entries:
+            strip = [] if entry == -1 else [*strip, entry]
+            if len(strip) > 2 and len(set(strip[-3:])) == 3:
+                a, b, c = strip[-3:]
+                wanted.append((a, c, b) if len(strip) % 2 == 0 else (a, b, c))
+    flat = np.array([entry for entries in lists for entry in entries], np.int64)
+    found = unroll_strips(np.array([len(entries) for entries in lists], np.int64), flat)
+    assert found.tolist() == [list(face) for face in wanted]
+
+
 def test_ply_colors_are_scaled_by_their_type(tmp_path):
     for kind, full in (("uchar", 255), ("ushort", 65535), ("float", 1)):
         header = [*VERTEX, *(f"property {kind} {c}" for c in ("red", "green", "blue")), *FACE]
@@ -107,6 +145,9 @@ def test_useless_normals_in_a_file_are_computed_instead(tmp_path, normal):
         (["element vertex 0", *VERTEX[1:]], "", "no vertices"),
         ([*VERTEX, "property float rot_0"], "0 0 0 1\n" * 4, "holds Gaussian splats"),
         (VERTEX + FACE, POINTS + "2 0 1\n2 1 2\n", "fewer than three corners"),
+        (VERTEX + STRIPS, POINTS + "4 0 1 1 0\n3 0 1 -1\n", "fewer than three corners"),
+        (VERTEX + STRIPS, POINTS + "4 0 1 2 4\n3 0 1 2\n", "faces ask for vertices 0…4, the file has 4"),
+        (VERTEX + STRIPS, POINTS + "4 0 1 2 -2\n3 0 1 2\n", "faces ask for vertices -2…2"),
         (VERTEX + FACE, POINTS + "3 0 1 2\n3 0 1 4\n", "faces ask for vertices 0…4, the file has 4"),
         (VERTEX + FACE, POINTS + "3 0 1 2\n3 0 -1 2\n", "faces ask for vertices -1…2"),
         (VERTEX + FACE, POINTS + "3 0 1 2\n", "truncated"),

@@ -76,12 +76,6 @@ def test_bad_ply_points(tmp_path):
     refused(ply(tmp_path, names, table(XYZ, colors)), "0…65535, found NaN in 1 of 12")
 
 
-def test_obj_without_faces_is_points(tmp_path):
-    lines = "".join(f"v {x:g} {y:g} {z:g} {r:g} {g:g} {b:g}\n" for (x, y, z), (r, g, b) in zip(XYZ, RGB, strict=True))
-    check(only(write(tmp_path, "a.obj", lines)), RGB / 255)
-    check(only(write(tmp_path, "b.obj", lines + "vn 0 1 0\n" * 4)), RGB / 255, [(0, 1, 0)] * 4)
-
-
 # --- text -----------------------------------------------------------------------------------------
 
 

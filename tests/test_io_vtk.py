@@ -114,6 +114,8 @@ def test_legacy(tmp_path, kind, dtype, spacing, table):
     head = HEAD.format(form="ASCII", spacing=spacing, type=kind) + table
     path.write_text(head + "\n".join(" ".join(map(str, row)) for row in phantom("int16").reshape(35, 9)) + "\n")
     check_phantom(load_one(path))
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    check_phantom(load_one(path))
 
 
 def test_legacy_that_cannot_be_read(tmp_path):

@@ -102,7 +102,7 @@ def _describe_mesh(mesh: Mesh) -> list[str]:
     parts = [f"{len(mesh.faces):,} triangles, {len(mesh.vertices):,} vertices"]
     parts.append("watertight" if mesh.is_closed else "open")
     parts.append("two-sided" if mesh.two_sided else "one-sided")
-    parts.append("normals given" if mesh.normals is not None else "normals computed")
+    parts.append("normals computed" if mesh.normals is None else "with normals")
     if mesh.colors is not None:
         parts.append("vertex colours")
     if mesh.texture is not None:

@@ -13,6 +13,7 @@ from ..errors import FileError
 from ..image import as_path
 
 PathLike = str | os.PathLike[str]
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # of UTF-8; editors on Windows write it
 
 
 def read_bytes(path: PathLike, asked_by: PathLike | None = None, limit: int = -1) -> bytes:
@@ -60,6 +61,11 @@ def read_bytes(path: PathLike, asked_by: PathLike | None = None, limit: int = -1
     if start.startswith(b"version https://git-lfs"):
         raise FileError(f"{path}: is a Git LFS pointer, not the file itself; run git lfs pull")
     return data
+
+
+def read_text(path: PathLike) -> bytes:
+    """Return the contents of a file that is, or begins as, text: those of `read_bytes` without a byte order mark."""
+    return read_bytes(path).removeprefix(BYTE_ORDER_MARK)
 
 
 def check_start(path: PathLike) -> None:

@@ -24,6 +24,7 @@ from .mesh import check_indices, usable_normals
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _KNOWN_EXTENSIONS = ("KHR_mesh_quantization", "KHR_texture_transform", "EXT_texture_webp", "KHR_lights_punctual")
+_NETWORK = ("http://", "https://", "ftp://")
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
 
@@ -128,6 +129,8 @@ class _File:
             if head.endswith(";base64"):
                 return base64.b64decode(body, validate=False)
             return urllib.parse.unquote_to_bytes(body)
+        if uri.lower().startswith(_NETWORK):
+            raise FileError(f"{self.path}: needs {uri!r}, expected a file beside it: uris of the network are not read")
         return self.path.parent / urllib.parse.unquote(uri)
 
     def buffer(self, index: int) -> bytes:

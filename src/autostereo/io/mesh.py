@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from ..errors import FileError
 from ..scene.mesh import Mesh, merge_positions
 from ..scene.points import Points
-from .files import PathLike, numbers, read_bytes, whole_numbers
+from .files import PathLike, numbers, read_bytes, read_text, whole_numbers
 from .image import read_image
 from .ply import Ply, Ragged, read_ply
 from .points import points_of_columns
-from .polygons import triangulate, weld
+from .polygons import triangulate, unroll_strips, weld
 
 _COLOR_NAMES = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
@@ -38,26 +38,31 @@ def load_ply(path: PathLike) -> list[Mesh] | list[Points]:
     """Read a PLY file: a mesh, or points where it has no faces.
 
     Of a mesh positions, normals, colours and texture coordinates of vertices or of face corners are read, of points
-    positions, normals, colours (else intensity, as greys) and radius.
+    positions, normals, colours (else intensity, as greys) and radius. Strips of triangles (element 'tristrips', lists
+    in which −1 ends a strip) follow the faces; colours and texture coordinates of faces are then not used.
     """
     ply = read_ply(path)
     vertex, face = ply.elements.get("vertex", {}), ply.elements.get("face", {})
     vertices = _pick(vertex, (("x", "y", "z"),))
     if vertices is None:
         raise FileError(f"{path}: the PLY file has no element 'vertex' with x, y, z")
-    polygons = face.get("vertex_indices", face.get("vertex_index"))
-    if not isinstance(polygons, Ragged) or not len(polygons.counts):
+    polygons, strips = _lists(face), _lists(ply.elements.get("tristrips", {}))
+    if not len(polygons.counts) and not len(strips.counts):
         if "rot_0" in vertex:
             raise FileError(f"{path}: holds Gaussian splats, which cannot be drawn so far")
         if not len(vertices):
             raise FileError(f"{path}: has no vertices")
         columns = {name: values for name, values in vertex.items() if isinstance(values, np.ndarray)}
         return [points_of_columns(columns, path)]
-    indices = polygons.values.astype(np.int64)
+    if len(strips.counts):
+        triangles = unroll_strips(*strips)
+        counts = np.concatenate([polygons.counts, np.full(len(triangles), 3)])
+        polygons, face = Ragged(counts, np.concatenate([polygons.values, triangles.ravel()])), {}
+    indices = polygons.values
     check_indices(indices, len(vertices), path)
     corner = triangulate(polygons.counts, indices, vertices)
     if not len(corner):
-        raise FileError(f"{path}: has no triangles, every face has fewer than three corners")
+        raise FileError(f"{path}: has no triangles, every face or strip has fewer than three corners")
     normals = usable_normals(_pick(vertex, (("nx", "ny", "nz"),)))
     colors, uv = _colors(vertex), _pick(vertex, _UV_NAMES)
     faces, pick = indices[corner], np.arange(len(vertices))
@@ -83,6 +88,14 @@ def load_ply(path: PathLike) -> list[Mesh] | list[Points]:
             texture=_ply_texture(ply, path) if uv is not None else None,
         )
     ]
+
+
+def _lists(element: dict[str, NDArray | Ragged]) -> Ragged:
+    """Lists of vertex indices, int64; none where the element has no such property."""
+    lists = element.get("vertex_indices", element.get("vertex_index"))
+    if not isinstance(lists, Ragged):
+        return Ragged(np.zeros(0, np.int64), np.zeros(0, np.int64))
+    return Ragged(lists.counts, lists.values.astype(np.int64))
 
 
 def _pick(element: dict[str, NDArray | Ragged], choices: tuple[tuple[str, ...], ...]) -> NDArray | None:
@@ -114,7 +127,7 @@ def load_stl(path: PathLike) -> list[Mesh]:
     """Read an STL mesh, binary or ASCII. Equal positions become one vertex; facet normals follow from the winding."""
     data = read_bytes(path)
     count = int.from_bytes(data[80:84], "little") if len(data) >= 84 else -1
-    if re.match(rb"\s*solid\b", data, re.IGNORECASE) and len(data) != 84 + 50 * count:
+    if re.match(rb"(\xef\xbb\xbf)?\s*solid\b", data, re.IGNORECASE) and len(data) != 84 + 50 * count:
         corners = _stl_text(data, path)
     elif count < 0 or len(data) < 84 + 50 * count:
         raise FileError(
@@ -149,7 +162,7 @@ def _stl_text(data: bytes, path: PathLike) -> NDArray[np.float64]:
 
 def load_off(path: PathLike) -> list[Mesh]:
     """Read an OFF mesh (text), with the vertex normals (N), colours (C) and texture coordinates (ST) of its header."""
-    data = read_bytes(path)
+    data = read_text(path)
     lines = [line for line in re.sub(rb"#[^\r\n]*", b"", data).splitlines() if line.strip()]
     header = re.fullmatch(rb"\s*(ST)?(C)?(N)?OFF\b(.*)", lines[0]) if lines else None
     if header is None:

@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 from ..errors import FileError
 from ..scene.appearance import Material
 from ..scene.mesh import Mesh
-from ..scene.points import Points
-from .files import PathLike, numbers, read_bytes, whole_numbers
+from .files import PathLike, numbers, read_text, whole_numbers
 from .image import read_image
 from .mesh import usable_normals
-from .points import make_points
 from .polygons import triangulate, weld
 
 # options of map_Kd and how many words follow them; the file name is what comes after
@@ -29,10 +27,12 @@ _MAP_OPTIONS = {
 
 @dataclass
 class _Surface:
-    """One MTL material: kd, its texture file, and the reflection weights."""
+    """One MTL material: kd, its texture file and where that lies, and the reflection weights."""
 
     kd: NDArray[np.float64] = field(default_factory=lambda: np.ones(3))
     texture: Path | None = None
+    scale: tuple[float, ...] = (1.0, 1.0)  # the texture is looked up at uv · scale + offset
+    offset: tuple[float, ...] = (0.0, 0.0)
     specular: float = 0.0
     shininess: float = 32.0
     illum: int = 2
@@ -59,8 +59,8 @@ class _Text:
     libraries: list[bytes] = field(default_factory=list)
 
 
-def load_obj(path: PathLike) -> list[Mesh] | list[Points]:
-    """Read an OBJ file: one Mesh for each material (in the order of first use), or Points where it has no faces.
+def load_obj(path: PathLike) -> list[Mesh]:
+    """Read an OBJ file: one Mesh for each material, in the order of first use.
 
     Polygons are cut into triangles; lines, points, groups and smoothing groups are ignored. Where the file has
     no normals, they are computed over the whole file, so that a border between materials stays smooth.
@@ -76,13 +76,11 @@ def load_obj(path: PathLike) -> list[Mesh] | list[Points]:
     UserWarning
         A material library or a material does not exist; its faces are drawn white.
     """
-    text = _statements(read_bytes(path))
+    text = _statements(read_text(path))
     if not text.f:
         if not text.v:
             raise FileError(f"{path}: is not an OBJ file, it has no vertices")
-        positions, colors = _vertices(text.v, path)
-        given = _rows(text.vn, 3, path, "normals (vn)")[:, :3]
-        return [make_points(positions, given if len(given) == len(positions) else None, colors)]
+        raise FileError(f"{path}: has no triangles, its {len(text.v)} vertices are in no face (f)")
     vertices, colors = _vertices(text.v, path)
     uv = _rows(text.vt, 1, path, "texture coordinates (vt)")
     uv = np.pad(uv, ((0, 0), (0, max(0, 2 - uv.shape[1]))))[:, :2]
@@ -114,6 +112,7 @@ def load_obj(path: PathLike) -> list[Mesh] | list[Points]:
                 pixels = read_image(surface.texture, asked_by=path)[..., :3]
                 textures[surface.texture] = np.ascontiguousarray(pixels)  # one array for all that wear it
             texture = textures[surface.texture]
+            mesh_uv = mesh_uv * surface.scale + surface.offset
         kd = np.ones((len(v), 3)) if colors is None else colors[v]
         mesh = Mesh(
             vertices[v],
@@ -269,7 +268,7 @@ def _read_mtl(path: Path) -> dict[bytes, _Surface]:
     """Materials of one MTL file by name."""
     surfaces: dict[bytes, _Surface] = {}
     surface, content = _Surface(), False
-    for line in read_bytes(path).splitlines():
+    for line in read_text(path).splitlines():
         word, _, rest = line.strip().replace(b"\t", b" ").partition(b" ")
         words = rest.split()
         key = word.lower()
@@ -285,7 +284,9 @@ def _read_mtl(path: Path) -> dict[bytes, _Surface]:
         elif key == b"illum" and words:
             surface.illum = int(whole_numbers(words[:1], path, "illum")[0])
         elif key == b"map_kd" and words:
-            surface.texture = path.parent / _map_name(rest.strip()).decode("utf-8", "replace").replace("\\", "/")
+            name, given = _map(rest.strip(), path)
+            surface.texture = path.parent / name.decode("utf-8", "replace").replace("\\", "/")
+            surface.scale, surface.offset = (*given[b"-s"], 1.0, 1.0)[:2], (*given[b"-o"], 0.0, 0.0)[:2]
     if not surfaces and content:
         raise FileError(f"{path}: is not a library of materials (MTL), no line begins with newmtl")
     for surface in surfaces.values():
@@ -302,17 +303,24 @@ def _rgb(words: list[bytes], path: PathLike, what: str) -> NDArray[np.float64]:
     return np.clip(value if len(value) == 3 else np.full(3, value[0]), 0.0, 1.0)
 
 
-def _map_name(rest: bytes) -> bytes:
-    """The file name of a map statement, after its options; it may hold blanks."""
+def _map(rest: bytes, path: PathLike) -> tuple[bytes, dict[bytes, list[float]]]:
+    """The file name of a map statement, which may hold blanks, and the numbers given (none to three) for -s and -o."""
+    given: dict[bytes, list[float]] = {b"-s": [], b"-o": []}
     while rest.startswith(b"-"):
         option, _, rest = rest.partition(b" ")
-        for _ in range(_MAP_OPTIONS.get(option.lower(), 0)):
+        option, words = option.lower(), []
+        for _ in range(_MAP_OPTIONS.get(option, 0)):
             head, _, tail = rest.lstrip().partition(b" ")
-            if option.lower() in (b"-o", b"-s", b"-t") and not _looks_numeric(head):
+            if option in (b"-o", b"-s", b"-t") and not _looks_numeric(head):
                 break  # one to three numbers
+            words.append(head)
             rest = tail
+        if option in given:
+            given[option] = numbers(words, path, f"map_Kd {option.decode()}").tolist()
+            if not np.isfinite(given[option]).all():
+                raise FileError(f"{path}: expected finite numbers for map_Kd {option.decode()}")
         rest = rest.lstrip()
-    return rest.strip().strip(b'"')
+    return rest.strip().strip(b'"'), given
 
 
 def _looks_numeric(word: bytes) -> bool:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from ..scene.points import Points
-from .files import PathLike, numbers, read_bytes
+from .files import PathLike, numbers, read_text
 from .points import points_of_columns
 
 _KINDS = {"F": "f", "I": "i", "U": "u"}
@@ -36,7 +36,7 @@ def load_pcd(path: PathLike) -> list[Points]:
     FileError
         The file is not PCD, ends before what its header announces, or holds no usable point.
     """
-    data = read_bytes(path)
+    data = read_text(path)
     header = _header(data, path)
     body = memoryview(data)[header.start :]
     if header.data == "ascii":

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from .files import PathLike, numbers, read_bytes
+from .files import PathLike, numbers, read_text
 
 _TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
@@ -57,7 +57,7 @@ def read_ply(path: PathLike) -> Ply:
     FileError
         The header is not PLY, or the data end before what the header announces.
     """
-    data = read_bytes(path)
+    data = read_text(path)
     order, elements, comments, body = _header(data, path)
     for element in elements:
         if element.count and not element.properties:

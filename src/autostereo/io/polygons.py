@@ -45,6 +45,34 @@ def triangulate(counts: Ints, corners: Ints, vertices: NDArray[np.float64]) -> I
     return triangles
 
 
+def unroll_strips(counts: Ints, corners: Ints) -> Ints:
+    """Triangles of strips: of each three corners in a row, every second one turned.
+
+    Parameters
+    ----------
+    counts : ndarray of shape (P,), int
+        Entries of each list; a strip ends with its list, and before every entry −1.
+    corners : ndarray of shape (C,), int
+        Vertex indices and −1, list after list; C = counts.sum().
+
+    Returns
+    -------
+    ndarray of shape (F, 3), int64
+        Vertex indices, without triangles that name a vertex twice: they lead from one strip to the next.
+    """
+    cut = corners == -1
+    first = cut.copy()  # of a strip, or −1
+    first[1:] |= cut[:-1]
+    ends = np.cumsum(counts)
+    first[(ends - counts)[counts > 0]] = True
+    strip, at = np.cumsum(first), np.arange(len(corners))
+    step = at - np.maximum.accumulate(np.where(first, at, 0))
+    k = at[2:][strip[2:] == strip[:-2]] - 2  # −1 is a strip of its own, of one entry
+    turned = step[k] % 2
+    a, b, c = faces = corners[k], corners[k + 1 + turned], corners[k + 2 - turned]
+    return np.stack(faces, axis=1)[(a != b) & (b != c) & (c != a)]
+
+
 def _concave(counts: Ints, corners: Ints, vertices: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which polygons (P,) turn the other way at some corner."""
     concave = np.zeros(len(counts), dtype=bool)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..errors import FileError, UnsupportedError
 from ..scene.volume import Volume
-from .files import PathLike, numbers, read_bytes, whole_numbers
+from .files import PathLike, numbers, read_bytes, read_text, whole_numbers
 from .volume import NO_HINTS, Hints, make_volume
 
 _LEGACY = {
@@ -50,7 +50,7 @@ def load_vtk(path: PathLike, hints: Hints = NO_HINTS) -> list[Volume]:
     FileError
         The file is missing, truncated, or holds something else.
     """
-    data = read_bytes(path)
+    data = read_text(path)
     if not data.startswith(b"# vtk DataFile"):
         raise FileError(f"{path}: is not a legacy VTK file, it does not begin with '# vtk DataFile'")
     start = re.search(rb"^\s*(SCALARS[ \t]+.*)\n(?:[ \t]*LOOKUP_TABLE.*\n)?", data, re.MULTILINE | re.IGNORECASE)
