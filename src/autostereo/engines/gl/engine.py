@@ -8,7 +8,7 @@ methods need; METHODS says by which methods a kind is drawn.
 `draw_views(job, tiles)`
     Draw the views of `tiles` into their tiles of `job.atlas`: view `job.first + t`, camera offset and place of the tile
     in `views[t]` of lib/views.glsl. For all methods but covering-quad; `job.draw.method` says which. `tiles` is one for
-    n-pass, `views_per_pass` for geometry-shader, all for the others. What a mask hides has depth 0 already.
+    n-pass, at most `views_per_pass` for geometry-shader, all for the others. What a mask hides has depth 0 already.
 `draw_channels(job)`
     Draw what the sub-pixels of a panel see, those of each channel into a tile of their own of `job.atlas` (channel
     `job.first + t`), each sub-pixel for its own camera (`job.masked_program`, lib/viewmap.glsl): a single pass that

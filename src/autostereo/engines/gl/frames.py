@@ -12,7 +12,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import UnsupportedError
 from ..engine import Draw, Target, channel_camera, small_camera
 from ..gathering import Tiles
 from .atlas import Atlas, Layout
@@ -76,10 +75,8 @@ def passes(job: Job) -> Iterator[range]:
 
 def targets_per_pass(job: Job) -> int:
     """Views of a pass that has a render target for each (de Sorbier 2008, section 4.2: "limits … to eight")."""
-    most, asked = job.device.limits.draw_buffers, job.draw.options.views_per_pass
-    if asked is not None and min(asked, job.count) > most:
-        raise UnsupportedError(f"views_per_pass {asked}: this device has {most} render targets: choose fewer, or None")
-    return asked or most
+    most = job.device.limits.draw_buffers
+    return min(job.draw.options.views_per_pass or most, most)
 
 
 def draw_tiles(job: Job, stages: list[Stage], channels: tuple[float, ...] | None = None) -> None:

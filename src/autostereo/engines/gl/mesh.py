@@ -159,22 +159,9 @@ def set_sides(ctx: Any, part: Part) -> None:
 
 
 def copies_at_once(job: Job, defines: Defines, views: int) -> int:
-    """How many copies of a triangle a geometry shader can make, `views` at most.
-
-    Raises
-    ------
-    UnsupportedError
-        More are asked for by `Options.views_per_pass`.
-    """
+    """How many copies of a triangle a geometry shader makes, `views` at most."""
     numbers = POSITION_NUMBERS + numbers_of_surface(defines)
-    most = min(GEOMETRY_NUMBERS // numbers, job.device.limits.geometry_vertices) // 3
-    asked = job.draw.options.views_per_pass
-    if asked is not None and min(asked, views) > most:
-        raise UnsupportedError(
-            f"views_per_pass {asked}: geometry shaders of this device make at most {most} copies of such a triangle, "
-            f"{GEOMETRY_NUMBERS} numbers: choose fewer, or None"
-        )
-    return min(views, most)
+    return min(views, min(GEOMETRY_NUMBERS // numbers, job.device.limits.geometry_vertices) // 3)
 
 
 def numbers_of_surface(defines: Defines) -> int:
