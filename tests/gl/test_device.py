@@ -20,6 +20,7 @@ from autostereo.engines.gl import context, programs
 from autostereo.engines.gl.atlas import MAX_PIXELS, Layout
 from autostereo.engines.gl.engine import METHODS
 from autostereo.engines.gl.job import read_by
+from autostereo.engines.gl.volume import TOGETHER
 from autostereo.scene.samples import shells, surfel_cloud
 from gl_device import need_device
 
@@ -186,6 +187,9 @@ def test_auto_is_the_cpu_on_software(monkeypatch):
     monkeypatch.setattr(context, "hardware_answers", lambda: True)
     assert engine.choose_engine(SCENE) == "gl"
     assert aus.Renderer(SCENE).engine.name == "gl"
+    body = shells(16)
+    assert engine.choose_engine(aus.Scene([body] * TOGETHER + [replace(body, mode="mip")])) == "gl"
+    assert engine.choose_engine(aus.Scene([body] * (TOGETHER + 1))) == "cpu"
     monkeypatch.setattr(gl_engine, "METHODS", {})  # a GPU, and a scene that gl does not draw
     assert engine.choose_engine(SCENE) == "cpu"
     engine.gpu_answers.cache_clear()

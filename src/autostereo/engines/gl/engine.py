@@ -48,7 +48,7 @@ from .panel import Panel
 from .plane_rasterizer import METHODS as PLANE_METHODS
 from .plane_rasterizer import PlaneMeshes
 from .points import PointClouds
-from .volume import Isosurfaces, Volumes
+from .volume import TOGETHER, Isosurfaces, Volumes, composed
 
 STAGES: tuple[tuple[type, type[Any]], ...] = (
     (Mesh, PlaneMeshes),
@@ -177,6 +177,12 @@ class GlEngine:
         """A job without a scene, to gather pictures by the mask."""
         nothing: Any = None
         return with_mask(Job(device, nothing, np.zeros(3), draw, nothing, Blocks(device), Kept()))
+
+
+def draws(scene: Scene) -> bool:
+    """Whether this engine draws all of a scene together, as far as that is known without a device."""
+    known = all(type(item) in METHODS for item in scene.objects)
+    return known and len(composed([item for item in scene.objects if isinstance(item, Volume)])) <= TOGETHER
 
 
 def make_stages(
