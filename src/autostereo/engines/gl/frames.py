@@ -1,7 +1,8 @@
 """A frame: atlas after atlas, pass after pass, sample after sample; then gathered, and read back once.
 
 How often the scene is traversed is all that the methods for views differ in (`passes`); they fill the same tiles of
-the same atlas through the same shaders, so that their pictures are the same.
+the same atlas through the same shaders, so that their pictures are the same; but geometry-shader has one shader more,
+and what it clips is rounded a little otherwise.
 """
 
 from __future__ import annotations
