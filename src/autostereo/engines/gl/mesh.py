@@ -42,11 +42,13 @@ class Meshes(Stage):
         self.triangles, self._few = some_triangles(meshes)
 
     def costs(self, job: Job) -> tuple[float, float]:
-        """From the sizes of some triangles' covering quads."""
+        """From the sizes of some triangles' covering quads; without compute shaders there are none."""
         width, height, slide = self.sizes(job)
         camera = job.draw.camera
         area = float(np.mean(np.minimum(width + 1 + slide, camera.width) * np.minimum(height + 1, camera.height)))
         views = VIEW_TRIANGLE * len(job.draw.offsets) * self.triangles
+        if job.device.version < COMPUTE_VERSION:
+            return views, float("inf")
         return views, self.triangles * (QUAD_TRIANGLE + 3 * QUAD_FRAGMENT * area)
 
     def sizes(self, job: Job) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -112,6 +114,8 @@ class Meshes(Stage):
 
     def draw_channels(self, job: Job) -> None:
         """Draw a covering quad per triangle and channel."""
+        method = f"method {job.draw.method!r} of meshes for this display"
+        job.device.require(COMPUTE_VERSION, method, "method 'n-pass' or engine='cpu'")
         ctx = job.device.ctx
         assert job.columns is not None
         job.atlas.target.use()
