@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +12,6 @@ import pytest
 from autostereo.cli.benchmarks import (
     harness,
     papers,
-    papers_counts,
     papers_plane,
     papers_published,
     papers_varyings,
@@ -26,6 +24,8 @@ from autostereo.cli.benchmarks.papers_plane import STAGGER
 from autostereo.cli.benchmarks.papers_studio import PapersStudio, Way, on_cpu
 from autostereo.cli.benchmarks.suite import BenchOptions, Work
 from autostereo.display.display import Display
+from autostereo.engines import engine as engines
+from autostereo.engines.gl import context
 from autostereo.engines.options import Options
 from autostereo.errors import DependencyError, InputError
 from autostereo.render import Renderer
@@ -215,29 +215,28 @@ def test_charts_are_pictures(measured):
 # --- what goes wrong -------------------------------------------------------------------------------------------------
 
 
-def test_without_a_device_everything_is_reported_as_not_available(monkeypatch, capsys):
-    door = sys.modules["autostereo.render"]
-    get_engine = door.get_engine
+@pytest.fixture
+def no_device(monkeypatch):
+    """A process that gets no OpenGL, and has none yet."""
+    monkeypatch.setattr(context, "_made", DependencyError("engine gl gets no OpenGL context"))
+    monkeypatch.setattr(engines, "_made", {})
 
-    def missing(name, scene=None):
-        if name == "gl":
-            raise DependencyError("engine gl gets no OpenGL context")
-        return get_engine(name, scene)
 
-    def no_device():
-        raise DependencyError("engine gl gets no OpenGL context")
-
-    monkeypatch.setattr(door, "get_engine", missing)
-    monkeypatch.setattr(papers_counts, "get_device", no_device)
-    monkeypatch.setattr(PapersStudio, "device", None)
-    counted = papers.run(quick("2020-multiplications"), silent)
-    assert len(counted) == 3 and {f["note"] for f in counted} == {"not available: engine gl gets no OpenGL context"}
-    results = report.bench("papers", quick("2008-table3"), None, silent)
-    refused = [f for f in results if f["value"] is None]
-    reason = "not available: engine gl gets no OpenGL context; data: stand-in displaced_sphere(2), 320 triangles"
-    assert {f["note"] for f in refused} == {reason}
+@pytest.mark.usefixtures("no_device")
+def test_without_a_device_the_reason_is_said_once(capsys):
+    lines = []
+    results = report.bench("papers", quick("2020-multiplications", "2008-table3"), None, lines.append)
+    assert [line for line in lines if "context" in line] == ["without engine gl: engine gl gets no OpenGL context"]
+    notes = {f["note"].split("; ")[0] for f in results if f["value"] is None}
+    assert notes == {"not available: no OpenGL"}
     assert [f["measure"] for f in results if f["value"] is not None] == ["cpu engine"]
     assert "OpenGL: none" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("no_device")
+def test_where_nothing_can_be_measured_the_reason_is_the_error():
+    with pytest.raises(DependencyError, match=r"^engine gl gets no OpenGL context$"):
+        report.bench("papers", quick("2020-multiplications"), None, silent)
 
 
 def test_what_a_driver_refuses_costs_one_figure():

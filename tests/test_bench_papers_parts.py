@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from autostereo.cli.benchmarks import papers_counts, papers_data, papers_varyings, papers_volume, workloads
+from autostereo.cli.benchmarks import (
+    papers_counts,
+    papers_data,
+    papers_plots,
+    papers_varyings,
+    papers_volume,
+    workloads,
+)
 from autostereo.cli.benchmarks.papers_published import BUCKY, BUNNY, DRAGON, NEGHIP
 from autostereo.cli.benchmarks.papers_studio import PapersStudio, Way, programs_in_use
 from autostereo.cli.benchmarks.suite import BenchOptions
@@ -48,6 +55,22 @@ def test_meshes_of_the_papers_are_read(tmp_path):
     (tmp_path / "meshes" / "dragon.ply").write_text(header + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
     scene, words = papers_data.stanford(options, DRAGON)
     assert words == "data: dragon.ply, 1 triangles" and len(scene.objects[0].vertices) == 3
+
+
+@pytest.mark.parametrize("work", ["2020-fig15", "focal-plane-quads"])
+def test_no_two_series_of_a_chart_look_alike(monkeypatch, tmp_path, work):
+    """Lines and bars."""
+    pytest.importorskip("matplotlib")
+    from matplotlib.figure import Figure
+
+    charts, names = [], [f"way {k}" for k in range(34)]
+    monkeypatch.setattr(Figure, "savefig", lambda chart, file, **_: charts.append(chart))
+    one = {"work": work, "unit": "fps", "scene": "8 views", "value": 1.0, "published": None}
+    papers_plots.plot(tmp_path, [one | {"measure": name} for name in names])
+    (axes,) = charts[0].axes
+    lines = [(line.get_color(), line.get_linestyle()) for line in axes.lines]
+    bars = [(bars[0].get_facecolor(), bars[0].get_hatch()) for bars in axes.containers]
+    assert len(set(lines + bars)) == len(names)
 
 
 def test_vertices_of_their_own_draw_the_same_picture():

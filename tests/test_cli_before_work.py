@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from autostereo.cli.benchmarks import report
+from autostereo.cli.benchmarks.suite import BenchOptions
+from autostereo.errors import InputError
 from commandline import Run, refused
 
 
@@ -28,8 +30,27 @@ def test_bench_looks_at_its_arguments_first(cli: Run, folder: Path) -> None:
         refused(cli("bench", "mesh", *more, "--data", "nope"), "nope: expected a folder with meshes/bun_zipper.ply")
     for name in ("papers", "volume", "points"):
         refused(cli("bench", name, "--data", "nope"), "nope: expected a folder")
-    refused(cli("bench", "mesh", "--quick", "--data", "square.off"), "square.off: expected a folder")
+        refused(cli("bench", name, "--data", "."), ".: expected a folder with meshes/ or volumes/, found none")
+    for wrong in (".", "square.off"):
+        refused(cli("bench", "mesh", "--quick", "--data", wrong), f"{wrong}: expected a folder with meshes/bun_zip")
     refused(cli("bench", "mesh", "nothing"), "there is no work 'nothing'")
+
+
+def test_bench_says_which_data_it_does_not_use(cli: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def enough(options: BenchOptions) -> None:
+        raise InputError("enough")
+
+    (tmp_path / "volumes").mkdir()
+    monkeypatch.setattr(report.papers, "facts", enough)
+    lines = cli("bench", "papers", "--quick", "--data", str(tmp_path)).err.splitlines()
+    said = f"--data {tmp_path} is not used with --quick: small stand-ins are drawn"
+    assert lines == [said, "autostereo: error: enough"]
+    for name, quick, word in (("papers", True, "--quick"), ("volume", False, "bench volume"), ("points", True, "own")):
+        said = report.unread(name, BenchOptions(data=tmp_path, quick=quick))
+        assert said.startswith(f"--data {tmp_path} is not used") and word in said and "\n" not in said
+    assert "work start" in report.unread("mesh", BenchOptions(data=tmp_path, quick=True))
+    for name, options in (("papers", BenchOptions(data=tmp_path)), ("papers", BenchOptions(quick=True))):
+        assert report.unread(name, options) == ""
 
 
 @pytest.mark.usefixtures("no_work")

@@ -20,6 +20,7 @@ from autostereo.engines.gl import context, programs
 from autostereo.engines.gl.atlas import MAX_PIXELS, Layout
 from autostereo.engines.gl.engine import METHODS
 from autostereo.engines.gl.job import read_by
+from autostereo.engines.gl.volume import TOGETHER
 from autostereo.scene.samples import shells, surfel_cloud
 from gl_device import need_device
 
@@ -166,6 +167,30 @@ def test_an_old_opengl_is_named():
         device.require(990, "the rasteriser")
 
 
+def test_what_an_old_opengl_lacks_is_named_with_what_to_choose_instead(monkeypatch):
+    monkeypatch.setattr(need_device(), "version", 420)
+    continuous = aus.Display.slanted(24, 16, 3, lens_pitch=0.5, subpixel_pitch=0.1, slant_deg=9, continuous=True)
+    table = aus.Display.wavelength_selective(24, 16)
+    with pytest.raises(aus.UnsupportedError, match=r"^drawing points .* needs OpenGL 4\.3.* choose engine='cpu'$"):
+        aus.Renderer(surfel_cloud(100), "gl")
+    quads = (table, "covering-quad"), (continuous, "covering-quad"), (continuous, "single-pass")
+    for display, method in quads:
+        instead = "choose method 'n-pass' or engine='cpu'$"
+        with pytest.raises(aus.UnsupportedError, match=f"^method {method!r} of meshes .* needs OpenGL 4.3.* {instead}"):
+            aus.render(SCENE, display, RIG, method=method, engine="gl")
+        assert aus.render(SCENE, display, RIG, method="n-pass", engine="gl").pixels.any()
+    assert aus.render(SCENE, table, RIG, engine="gl").pixels.any()  # few triangles: else by covering quads
+
+
+def test_auto_takes_no_gpu_that_cannot_draw_all_kinds(monkeypatch):
+    device = need_device()
+    monkeypatch.setattr(context, "GPU_NODES", ("/",))
+    monkeypatch.setattr(device, "renderer", "a GPU")
+    for version, answers in ((430, True), (420, False)):
+        monkeypatch.setattr(device, "version", version)
+        assert context.hardware_answers() is answers
+
+
 def test_a_picture_above_the_limit_is_named():
     device = need_device()
     too_wide = device.limits.texture + 1
@@ -186,6 +211,9 @@ def test_auto_is_the_cpu_on_software(monkeypatch):
     monkeypatch.setattr(context, "hardware_answers", lambda: True)
     assert engine.choose_engine(SCENE) == "gl"
     assert aus.Renderer(SCENE).engine.name == "gl"
+    body = shells(16)
+    assert engine.choose_engine(aus.Scene([body] * TOGETHER + [replace(body, mode="mip")])) == "gl"
+    assert engine.choose_engine(aus.Scene([body] * (TOGETHER + 1))) == "cpu"
     monkeypatch.setattr(gl_engine, "METHODS", {})  # a GPU, and a scene that gl does not draw
     assert engine.choose_engine(SCENE) == "cpu"
     engine.gpu_answers.cache_clear()

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import autostereo as aus
-from autostereo.engines.gl import plane_rasterizer, volume
+from autostereo.engines.gl import mesh, plane_rasterizer, volume
 from autostereo.engines.gl.context import Limits
 from autostereo.engines.gl.points_quads import Blended
 from autostereo.engines.gl.programs import SHADERS, source
@@ -160,9 +160,9 @@ def test_an_error_amid_a_drawing_leaves_nothing_behind(monkeypatch: pytest.Monke
     draw = partial(aus.render, SQUARE, PANEL, RIG, engine="gl")
     expected = draw(method="covering-quad").pixels.copy()
     assert expected.any()
-    with pytest.raises(aus.UnsupportedError, match="geometry shaders of this device"):
-        poorer(monkeypatch, geometry_vertices=3)
-        draw(method="geometry-shader", options=aus.Options(views_per_pass=2))
+    with pytest.raises(aus.UnsupportedError, match="refused"):
+        monkeypatch.setattr(mesh, "copies_at_once", refuse)
+        draw(method="geometry-shader")
     with pytest.raises(aus.UnsupportedError, match="refused"):
         monkeypatch.setattr(Blended, "give", refuse)
         aus.render(surfel_cloud(500), PANEL, RIG, method="covering-quad", engine="gl")

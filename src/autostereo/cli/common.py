@@ -86,7 +86,7 @@ Step = Annotated[float, typer.Option("--step", help="Volumes: distance of slices
 Rays = Annotated[str, typer.Option("--volume", help="Volumes: shared slabs for all views, or exact rays of their own.")]
 Alpha = Annotated[str, typer.Option("--alpha", help="exact, or averaged or minimal over three sub-pixels.")]
 PerPass = Annotated[
-    int | None, typer.Option("--views-per-pass", metavar="N", help="geometry-shader: views that one pass draws.")
+    int | None, typer.Option("--views-per-pass", metavar="N", help="geometry-shader: most views that one pass draws.")
 ]
 SmallSize = Annotated[
     str | None, typer.Option("--small-size", metavar="WxH", help="n-pass-subres: size of its small views.")

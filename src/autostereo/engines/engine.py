@@ -194,9 +194,9 @@ def choose_engine(scene: Scene) -> str:
     """The engine that "auto" means: gl where a GPU answers that can draw all of the scene, else cpu."""
     if not gpu_answers():
         return "cpu"
-    from .gl.engine import METHODS
+    from .gl.engine import draws
 
-    return "gl" if all(type(item) in METHODS for item in scene.objects) else "cpu"
+    return "gl" if draws(scene) else "cpu"
 
 
 def engine_that_has(method: str) -> str | None:

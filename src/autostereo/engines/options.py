@@ -45,7 +45,8 @@ class Options:
     volume, step
         For volumes.
     views_per_pass : int, optional
-        Method geometry-shader: views that one pass draws; None: as many as the device can.
+        Method geometry-shader: most views that one pass draws; fewer where the device can do no more, and None: as
+        many as it can.
     small_size : (int, int), optional
         Method n-pass-subres: width and height of its small views, at most the panel's; None: the panel's, each
         divided by √V, so that all views have as many pixels as the panel.

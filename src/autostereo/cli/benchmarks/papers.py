@@ -7,7 +7,7 @@ from typing import Any
 from . import papers_counts, papers_data, papers_mesh, papers_plane, papers_quads, papers_varyings, papers_volume
 from .harness import machine_facts
 from .papers_published import ILLUMINATION_2008, PASSES_2008, SOURCES, VIEWS_2008, VOLUMES_512
-from .papers_studio import PapersStudio
+from .papers_studio import PapersStudio, missing_device
 from .suite import BenchOptions, Keep, Results, Say, Work, check_works, run_works
 
 
@@ -18,10 +18,18 @@ def run(options: BenchOptions | None = None, say: Say = print, keep: Keep = lamb
     ------
     InputError
         A name in `only` is no work.
+    DependencyError, UnsupportedError
+        There is no OpenGL, and nothing could be measured without.
     """
     options = options or BenchOptions()
     check_works("papers", WORKS, options.only)
-    return run_works(WORKS, PapersStudio(options, say), options, say, keep=keep)
+    missing = missing_device()
+    if missing is not None:
+        say(f"without engine gl: {missing}")
+    results = run_works(WORKS, PapersStudio(options, say), options, say, keep=keep)
+    if missing is not None and all(f["value"] is None for f in results):
+        raise missing
+    return results
 
 
 def facts(options: BenchOptions | None = None) -> dict[str, Any]:

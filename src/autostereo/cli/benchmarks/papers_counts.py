@@ -24,7 +24,7 @@ from ...scene.mesh import Mesh
 from ...scene.scene import Scene
 from .harness import Figure
 from .papers_published import MULTIPLICATIONS_2020
-from .papers_studio import PapersStudio, programs_in_use
+from .papers_studio import PapersStudio, not_available, programs_in_use
 
 ONE, N_TIMES = "plane-rasterizer", "plane-rasterizer-n-pass"
 STAGES = ("plane_vertex.comp", "plane_setup.comp", "plane_tiles.comp", "plane_fine.comp", "plane_encode.comp")
@@ -194,7 +194,7 @@ def multiplications(studio: PapersStudio, name: str, lighting: str) -> list[Figu
         many, covered = count(views, N_TIMES)
         one, _ = count(views, ONE)
     except AutostereoError as error:
-        nothing, reason = (math.nan,) * 3, f"not available: {error}"
+        nothing, reason = (math.nan,) * 3, not_available(error)
         return [Figure("2020-multiplications", "counted by shaders", *nothing, "a sample", name, note=reason)]
     alone, each, shared = MULTIPLICATIONS_2020
     note = f"{covered / views:.0f} samples a view; unlit, colour, normal and position interpolated"

@@ -14,6 +14,8 @@ from ...image import write_atomic
 UNITS = {"fps": "frames per second", "%": "per cent", "ms": "milliseconds", "dB": "PSNR in dB", "a sample": "a sample"}
 LINES = ("2020-fig15", "2020-fig15-dibr")  # by a number of views
 LOGARITHMIC = ("fps", "ms")
+COLORS = 10  # of matplotlib's; what comes after them is told apart by
+DASHES, HATCHES = ("-", "--", ":", "-."), ("", "///", "...", "xxx")
 
 
 def need_matplotlib() -> None:
@@ -64,9 +66,11 @@ def plot(folder: Path, results: Sequence[dict[str, Any]]) -> list[Path]:
 
 def _lines(axes: Any, figures: Sequence[dict[str, Any]]) -> None:
     """Values by number of views, a line for each measure."""
-    for measure in dict.fromkeys(f["measure"] for f in figures):
+    for k, measure in enumerate(dict.fromkeys(f["measure"] for f in figures)):
         found = [f for f in figures if f["measure"] == measure]
-        axes.plot([int(f["scene"].split()[0]) for f in found], [f["value"] for f in found], marker="o", label=measure)
+        views, values = [int(f["scene"].split()[0]) for f in found], [f["value"] for f in found]
+        dash = DASHES[k // COLORS % len(DASHES)]
+        axes.plot(views, values, color=f"C{k % COLORS}", linestyle=dash, marker="o", label=measure)
     axes.set_xlabel("views")
 
 
@@ -78,7 +82,8 @@ def _bars(axes: Any, figures: Sequence[dict[str, Any]]) -> None:
     for k, measure in enumerate(measures):
         found = [f for f in figures if f["measure"] == measure]
         places = [scenes.index(f["scene"]) + (k + 0.5) * width - 0.4 for f in found]
-        axes.bar(places, [f["value"] for f in found], width, label=measure)
+        look = {"color": f"C{k % COLORS}", "hatch": HATCHES[k // COLORS % len(HATCHES)], "edgecolor": "white"}
+        axes.bar(places, [f["value"] for f in found], width, label=measure, **look)
         for place, f in zip(places, found, strict=True):
             if f["published"] is not None:
                 name = None if printed else "paper"

@@ -25,7 +25,7 @@ from .harness import Figure
 from .papers_counts import BINDING
 from .papers_data import Subject
 from .papers_published import BUNNY, SV
-from .papers_studio import CPU, PapersStudio, Row, Way, noted, on_cpu, programs_in_use
+from .papers_studio import CPU, PapersStudio, Row, Way, not_available, noted, on_cpu, programs_in_use
 
 QUADS = "covering-quad"
 FOCI = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0)  # of the distance to the object
@@ -139,6 +139,6 @@ def per_primitive(studio: PapersStudio, subject: Subject, row: Row, way: Way, co
         try:
             value = float(fragments(studio.renderer(subject.scene, "gl"), way, count).mean())
         except AutostereoError as error:
-            reason = f"not available: {error}"
+            reason = not_available(error)
     figure = Figure(row.work, measure, value, value, value, "fragments", row.scene, note=reason or "mean of all")
     return noted(figure, subject.words)

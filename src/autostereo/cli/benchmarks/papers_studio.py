@@ -129,10 +129,7 @@ class PapersStudio:
         """The OpenGL device, if there is one."""
         from ...engines.gl.context import get_device
 
-        try:
-            return get_device()
-        except AutostereoError:
-            return None
+        return get_device() if missing_device() is None else None
 
     def size(self, width: int, height: int) -> Size:
         """The picture size of a work, smaller each way if quick."""
@@ -170,7 +167,7 @@ class PapersStudio:
             try:
                 contenders.append(self._contender(way.scene or subject.scene, way))
             except AutostereoError as error:
-                refused[way.name] = f"not available: {error}"
+                refused[way.name] = not_available(error)
             except Exception as error:  # a driver's: one table less, not the end
                 refused[way.name] = f"failed: {type(error).__name__}: {(str(error).splitlines() or [''])[0]}"
         repeats = self.options.repeats or (1 if self.options.quick else 3)
@@ -184,7 +181,7 @@ class PapersStudio:
         try:
             return way.draw(self.renderer(scene, way.engine)).copy(), ""
         except AutostereoError as error:
-            return None, f"not available: {error}"
+            return None, not_available(error)
 
     def _contender(self, scene: Scene, way: Way) -> Contender:
         """A way that has drawn a frame, without an error of OpenGL, and not nothing."""
@@ -199,6 +196,23 @@ class PapersStudio:
             raise UnsupportedError(f"engine {way.engine} draws nothing of this by {way.method}")
         finish = device.finish if way.engine == "gl" and device is not None else _nothing
         return Contender(way.name, lambda: way.draw(renderer, out), finish=finish)
+
+
+def missing_device() -> AutostereoError | None:
+    """Why there is no OpenGL device; None where there is one."""
+    from ...engines.gl.context import get_device
+
+    try:
+        get_device()
+    except AutostereoError as error:
+        return error
+    return None
+
+
+def not_available(error: AutostereoError) -> str:
+    """Why a figure is missing, for its note; why there is no device is said once, at the start (papers.run)."""
+    missing = missing_device()
+    return f"not available: {'no OpenGL' if missing is not None and str(missing) == str(error) else error}"
 
 
 def _nothing() -> None:

@@ -24,10 +24,20 @@ def check(name: str, options: BenchOptions) -> None:
     check_works(name, SUITES[name].WORKS, options.only)
     if options.data is None:
         return
-    if name == "mesh" and not options.quick:
+    if name == "mesh":
         mesh.check_bunny(options.data)
-    elif not options.data.is_dir():
+    elif not any((options.data / kind).is_dir() for kind in ("meshes", "volumes")):
         raise InputError(f"{options.data}: expected a folder with meshes/ or volumes/, found none")
+
+
+def unread(name: str, options: BenchOptions) -> str:
+    """What is not drawn of the data folder that was given, in one line; nothing where it is used."""
+    if options.data is None:
+        return ""
+    if name in ("volume", "points"):
+        return f"--data {options.data} is not used: bench {name} makes its own data"
+    drawn = "small spheres are drawn, its bunny only by work start" if name == "mesh" else "small stand-ins are drawn"
+    return f"--data {options.data} is not used with --quick: {drawn}" if options.quick else ""
 
 
 def bench(name: str, options: BenchOptions, path: Path | None = None, say: Say = print) -> Results:
@@ -43,6 +53,8 @@ def bench(name: str, options: BenchOptions, path: Path | None = None, say: Say =
         Is told in one line what is being measured and what is left out.
     """
     check(name, options)
+    if left := unread(name, options):
+        say(left)
     suite = SUITES[name]
     facts = suite.facts(options)  # before the run, whose own load does not count
 

@@ -179,12 +179,12 @@ class Device:
         with self:
             self.ctx.finish()
 
-    def require(self, version: int, what: str) -> None:
+    def require(self, version: int, what: str, instead: str = "another method or engine='cpu'") -> None:
         """Raise UnsupportedError unless the context has this OpenGL version (430 is 4.3)."""
         if self.version < version:
             raise UnsupportedError(
                 f"{what} needs OpenGL {_dotted(version)}, {self.renderer} has {_dotted(self.version)}: "
-                "update the graphics driver, or choose another method or engine='cpu'"
+                f"update the graphics driver, or choose {instead}"
             )
 
     def check_texture(self, size: tuple[int, int], what: str) -> None:
@@ -264,11 +264,15 @@ def get_device() -> Device:
 
 
 def hardware_answers() -> bool:
-    """Whether a GPU can be drawn with. Where the system shows none, no context is tried for: that takes a moment."""
+    """Whether a GPU can be drawn with, whatever is in the scene.
+
+    Where the system shows none, no context is tried for: that takes a moment.
+    """
     if sys.platform.startswith("linux") and not any(os.path.exists(node) for node in GPU_NODES):
         return False
     try:
-        return get_device().is_hardware
+        device = get_device()
+        return device.is_hardware and device.version >= COMPUTE_VERSION
     except AutostereoError:
         return False
 
@@ -283,7 +287,7 @@ def _make() -> Device:
     info, renderer = ctx.info, ctx.info["GL_RENDERER"]
     device = Device(ctx, ctx.version_code, renderer, Limits.of(info, is_software(renderer)))
     _release_current()
-    device.require(GL_VERSION, "engine gl")
+    device.require(GL_VERSION, "engine gl", "engine='cpu'")
     return device
 
 

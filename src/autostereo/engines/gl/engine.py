@@ -8,7 +8,7 @@ methods need; METHODS says by which methods a kind is drawn.
 `draw_views(job, tiles)`
     Draw the views of `tiles` into their tiles of `job.atlas`: view `job.first + t`, camera offset and place of the tile
     in `views[t]` of lib/views.glsl. For all methods but covering-quad; `job.draw.method` says which. `tiles` is one for
-    n-pass, `views_per_pass` for geometry-shader, all for the others. What a mask hides has depth 0 already.
+    n-pass, at most `views_per_pass` for geometry-shader, all for the others. What a mask hides has depth 0 already.
 `draw_channels(job)`
     Draw what the sub-pixels of a panel see, those of each channel into a tile of their own of `job.atlas` (channel
     `job.first + t`), each sub-pixel for its own camera (`job.masked_program`, lib/viewmap.glsl): a single pass that
@@ -48,7 +48,7 @@ from .panel import Panel
 from .plane_rasterizer import METHODS as PLANE_METHODS
 from .plane_rasterizer import PlaneMeshes
 from .points import PointClouds
-from .volume import Isosurfaces, Volumes
+from .volume import TOGETHER, Isosurfaces, Volumes, composed
 
 STAGES: tuple[tuple[type, type[Any]], ...] = (
     (Mesh, PlaneMeshes),
@@ -177,6 +177,12 @@ class GlEngine:
         """A job without a scene, to gather pictures by the mask."""
         nothing: Any = None
         return with_mask(Job(device, nothing, np.zeros(3), draw, nothing, Blocks(device), Kept()))
+
+
+def draws(scene: Scene) -> bool:
+    """Whether this engine draws all of a scene together, as far as that is known without a device."""
+    known = all(type(item) in METHODS for item in scene.objects)
+    return known and len(composed([item for item in scene.objects if isinstance(item, Volume)])) <= TOGETHER
 
 
 def make_stages(

@@ -1,7 +1,8 @@
 """A frame: atlas after atlas, pass after pass, sample after sample; then gathered, and read back once.
 
 How often the scene is traversed is all that the methods for views differ in (`passes`); they fill the same tiles of
-the same atlas through the same shaders, so that their pictures are the same.
+the same atlas through the same shaders, so that their pictures are the same; but geometry-shader has one shader more,
+and what it clips is rounded a little otherwise.
 """
 
 from __future__ import annotations
@@ -12,7 +13,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import UnsupportedError
 from ..engine import Draw, Target, channel_camera, small_camera
 from ..gathering import Tiles
 from .atlas import Atlas, Layout
@@ -76,10 +76,8 @@ def passes(job: Job) -> Iterator[range]:
 
 def targets_per_pass(job: Job) -> int:
     """Views of a pass that has a render target for each (de Sorbier 2008, section 4.2: "limits … to eight")."""
-    most, asked = job.device.limits.draw_buffers, job.draw.options.views_per_pass
-    if asked is not None and min(asked, job.count) > most:
-        raise UnsupportedError(f"views_per_pass {asked}: this device has {most} render targets: choose fewer, or None")
-    return asked or most
+    most = job.device.limits.draw_buffers
+    return min(job.draw.options.views_per_pass or most, most)
 
 
 def draw_tiles(job: Job, stages: list[Stage], channels: tuple[float, ...] | None = None) -> None:

@@ -42,11 +42,13 @@ class Meshes(Stage):
         self.triangles, self._few = some_triangles(meshes)
 
     def costs(self, job: Job) -> tuple[float, float]:
-        """From the sizes of some triangles' covering quads."""
+        """From the sizes of some triangles' covering quads; without compute shaders there are none."""
         width, height, slide = self.sizes(job)
         camera = job.draw.camera
         area = float(np.mean(np.minimum(width + 1 + slide, camera.width) * np.minimum(height + 1, camera.height)))
         views = VIEW_TRIANGLE * len(job.draw.offsets) * self.triangles
+        if job.device.version < COMPUTE_VERSION:
+            return views, float("inf")
         return views, self.triangles * (QUAD_TRIANGLE + 3 * QUAD_FRAGMENT * area)
 
     def sizes(self, job: Job) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -112,6 +114,8 @@ class Meshes(Stage):
 
     def draw_channels(self, job: Job) -> None:
         """Draw a covering quad per triangle and channel."""
+        method = f"method {job.draw.method!r} of meshes for this display"
+        job.device.require(COMPUTE_VERSION, method, "method 'n-pass' or engine='cpu'")
         ctx = job.device.ctx
         assert job.columns is not None
         job.atlas.target.use()
@@ -159,22 +163,9 @@ def set_sides(ctx: Any, part: Part) -> None:
 
 
 def copies_at_once(job: Job, defines: Defines, views: int) -> int:
-    """How many copies of a triangle a geometry shader can make, `views` at most.
-
-    Raises
-    ------
-    UnsupportedError
-        More are asked for by `Options.views_per_pass`.
-    """
+    """How many copies of a triangle a geometry shader makes, `views` at most."""
     numbers = POSITION_NUMBERS + numbers_of_surface(defines)
-    most = min(GEOMETRY_NUMBERS // numbers, job.device.limits.geometry_vertices) // 3
-    asked = job.draw.options.views_per_pass
-    if asked is not None and min(asked, views) > most:
-        raise UnsupportedError(
-            f"views_per_pass {asked}: geometry shaders of this device make at most {most} copies of such a triangle, "
-            f"{GEOMETRY_NUMBERS} numbers: choose fewer, or None"
-        )
-    return min(views, most)
+    return min(views, min(GEOMETRY_NUMBERS // numbers, job.device.limits.geometry_vertices) // 3)
 
 
 def numbers_of_surface(defines: Defines) -> int:

@@ -153,7 +153,7 @@ class Drawing:
     """One draw of meshes into the tiles of the job's atlas, or into a panel."""
 
     def __init__(self, job: Job, parts: list[Any]) -> None:
-        job.device.require(COMPUTE_VERSION, f"method {job.draw.method!r}")
+        job.device.require(COMPUTE_VERSION, f"method {job.draw.method!r}", "method 'n-pass' or engine='cpu'")
         check_size(job)
         self.job, self.parts = job, parts
         kept, device = job.kept, job.device

@@ -85,6 +85,7 @@ class PointClouds(Stage):
     """The points of a scene; a stage (engine.py)."""
 
     def __init__(self, device: Device, clouds: Sequence[Points], middle: NDArray[np.float64]) -> None:
+        device.require(COMPUTE_VERSION, "drawing points by engine gl", "engine='cpu'")
         self._buffers = SurfelBuffers(device, clouds, middle)
         self._quads = Quads(device, self._buffers)
 

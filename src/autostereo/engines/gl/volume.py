@@ -66,7 +66,7 @@ class Rays(Stage):
         self._coarse = device.filters_coarsely
         self._voxels = {id(v): send(device, v) for v in mine}
         self._looks = {id(v): Look(device, v, self._voxels[id(v)]) for v in mine}
-        compose = [v for v in mine if v.mode == "composite"]
+        compose = composed(mine)
         if len(compose) > TOGETHER:
             raise UnsupportedError(
                 f"engine gl: {len(compose)} volumes of mode 'composite', at most {TOGETHER} can be drawn together: "
@@ -238,6 +238,11 @@ class Isosurfaces(Rays):
 
 class Volumes(Rays):
     """All other volumes; a stage (engine.py), the last of all."""
+
+
+def composed(volumes: Sequence[Volume]) -> list[Volume]:
+    """Those that are drawn together, TOGETHER at most."""
+    return [v for v in volumes if v.mode == "composite"]
 
 
 def has_opaque(job: Job) -> bool:
