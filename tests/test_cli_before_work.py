@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import importlib
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from autostereo.cli.benchmarks import report
-from commandline import Run, refused
+from commandline import Run, files, refused
 
 
 @pytest.fixture
@@ -45,3 +48,21 @@ def test_simulated_numbers_of_views_and_machines_come_once(cli: Run, folder: Pat
     refused(cli("simulate", "level", "-n", "1,4,1"), "--views: expected each number once, got '1,4,1'")
     same = ("-m", "scanline", "-m", "scanline")
     refused(cli("simulate", "level", *same), "--machine: expected machines of different names, got scanline, scanline")
+
+
+def test_animations_have_room_beside_their_views(cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def work(*_: object, **__: object) -> None:
+        raise AssertionError("there was work")
+
+    Image.fromarray(np.zeros((800, 1000, 3), np.uint8)).save("a.png")
+    np.save("a.npy", np.ones((800, 1000), np.float32))
+    before = files(folder)
+    for verb in ("render_views", "warp"):
+        monkeypatch.setattr(importlib.import_module("autostereo.render"), verb, work)
+    monkeypatch.setattr("autostereo.memory.available_memory", lambda: 4 * 10 * 800_000 + 10_000_000)  # the views have
+    for suffix in ("gif", "webp", "mp4"):
+        message = f"a.{suffix}: an animation of 10 views of 1000×800 pixels would take 0."
+        views = ("-n", "10", "-o", f"a.{suffix}")
+        refused(cli("views", "square.off", *views, "--size", "1000x800"), message)
+        refused(cli("warp", "a.png", "a.npy", *views), message)
+    assert files(folder) == before

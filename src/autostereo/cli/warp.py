@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..wording import an, counted
 from . import common, outputs
 from .common import note, say
-from .views import ANIMATIONS, check_animation, write_views
+from .views import ANIMATIONS, check_animation, check_animation_room, write_views
 
 if TYPE_CHECKING:
     from ..display.display import Display
@@ -82,6 +82,8 @@ def warp(
         assert taken.depth is not None
         rig = frame_depths(taken.depth[0], target, field)
     rig = replace(rig.with_views(target.views), fov_y=field, aspect=taken.width / taken.height)
+    if suffix in ANIMATIONS and not to_panel:
+        check_animation_room(path, rig.views, (taken.width, taken.height), 8)  # color and depth
     with common.working(f"warping to {counted(rig.views, 'view')}"):
         stack = draw(taken, rig)
     if to_panel:
