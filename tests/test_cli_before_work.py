@@ -50,6 +50,37 @@ def test_simulated_numbers_of_views_and_machines_come_once(cli: Run, folder: Pat
     refused(cli("simulate", "level", *same), "--machine: expected machines of different names, got scanline, scanline")
 
 
+@pytest.mark.parametrize(
+    ("arguments", "size"),
+    [
+        ("render square.off -d lenticular-8 --size 16384x4 -o q.webp", "16384×4"),
+        ("render square.off -d lenticular-8 --size 4x16384 -o q.webp", "4×16384"),
+        ("weave a.png --grid 4x2 -d lenticular-8 --size 20000x20 -o q.webp", "20000×20"),
+        ("pattern -d lenticular-8 --size 20000x20 -o q.webp", "20000×20"),
+        ("quilt square.off --grid 2x1 --view-size 8192x20 -o q.webp", "16384×20"),
+        ("warp a.png a.npy -d lenticular-8 --size 20000x20 -o q.webp", "20000×20"),
+        ("observe wide.png -d lenticular-8 --view 0 -o q.webp", "16384×2"),
+    ],
+)
+def test_pictures_that_webp_cannot_hold(
+    arguments: str, size: str, cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def work(*_: object, **__: object) -> None:
+        raise AssertionError("there was work")
+
+    for module, name in (
+        ("render", "render"), ("render", "render_views"), ("render", "warp"), ("render", "observe"),
+        ("engines.cpu.gather", "weave"), ("cli.pattern", "spread"),
+    ):  # fmt: skip
+        monkeypatch.setattr(importlib.import_module(f"autostereo.{module}"), name, work)
+    Image.new("RGB", (40, 20)).save("a.png")
+    Image.new("RGB", (16384, 2)).save("wide.png")
+    np.save("a.npy", np.ones((20, 40), np.float32))
+    before = files(folder)
+    refused(cli(*arguments.split()), f".webp takes at most 16383 pixels a side, got {size}")
+    assert files(folder) == before
+
+
 def test_animations_have_room_beside_their_views(cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def work(*_: object, **__: object) -> None:
         raise AssertionError("there was work")

@@ -132,11 +132,9 @@ def check_animation(path: Path, size: tuple[int, int]) -> None:
     """Refuse, before the long work, an animation that could not be written after it."""
     from importlib.util import find_spec
 
-    from ..encoders.video import MAX_SIDE
+    from ..image import check_side
 
-    limit = MAX_SIDE[path.suffix.lower()]
-    if max(size) > limit:
-        raise InputError(f"{path}: {path.suffix} takes at most {limit} pixels a side, got {size[0]}×{size[1]}")
+    check_side(path, *size)
     if path.suffix.lower() == ".mp4" and find_spec("av") is None:
         raise DependencyError(f"{path}: mp4 needs PyAV; pip install autostereo[video]")
 

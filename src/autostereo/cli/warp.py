@@ -62,7 +62,11 @@ def warp(
     if where is not None and where.viewmap is None and to_panel:
         raise InputError(f"{where.name}: {an(where.layout)} picture is not interlaced; leave out --display for views")
     common.check_views(views)
-    outputs.check_output(path, (suffix,) if suffix else ())
+    if to_panel:
+        assert where is not None
+        outputs.check_image(path, where.picture_size)
+    else:
+        outputs.check_output(path, (suffix,) if suffix else ())
     outputs.check_apart(path, picture, depth)
     rig = common.load_camera(camera)
     field = rig.fov_y if rig is not None else 36.0 if fov is None else fov

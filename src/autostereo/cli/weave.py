@@ -58,7 +58,7 @@ def weave(
         )
     if where.viewmap is None:
         raise InputError(f"{where.name}: {an(where.layout)} picture is not woven from a quilt")
-    outputs.check_image(output)
+    outputs.check_image(output, where.picture_size)
     outputs.check_apart(output, quilt)
     pixels = common.load_picture(quilt, alpha=True)
     from ..engines.cpu.gather import weave as draw

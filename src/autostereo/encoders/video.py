@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import DependencyError, FileError, InputError, UnsupportedError
 from ..frame import ViewStack
-from ..image import as_path, write_atomic
+from ..image import as_path, check_side, write_atomic
 from ..memory import check_memory
 from ..wording import counted
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from PIL import Image
 
 ANIMATION_SUFFIXES = (".gif", ".webp", ".mp4")
-MAX_SIDE = {".gif": 65535, ".webp": 16383, ".mp4": 16384}
 H264_PIXELS, H264_SIDE = 4096 * 2304, 4096  # level 5.2, the last that common decoders take
 SWING_SECONDS = 3.0  # there and back, as far as 10…30 frames a second allow
 
@@ -65,9 +64,7 @@ def save_animation(path: str | os.PathLike[str], views: ViewStack, fps: float | 
         fps = min(max(len(order) / SWING_SECONDS, 10.0), 30.0)
     if not 0.1 <= fps <= 100:
         raise InputError(f"fps: expected 0.1…100 frames a second, got {fps!r}")
-    if max(views.width, views.height) > MAX_SIDE[suffix]:
-        limit = MAX_SIDE[suffix]
-        raise InputError(f"{path}: {suffix} takes at most {limit} pixels a side, got {views.width}×{views.height}")
+    check_side(path, views.width, views.height)
     copies = 0 if suffix != ".webp" or views.color[0].flags.c_contiguous else views.color.nbytes
     check_room(path, views.views, (views.width, views.height), copies)
     if suffix == ".mp4":
