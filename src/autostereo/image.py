@@ -26,10 +26,12 @@ def as_path(path: object) -> Path:
     Raises
     ------
     InputError
-        It is of a type that names no file.
+        It is of a type that names no file, or an empty text, which `Path` takes for the current folder.
     FileError
         The system refuses the name: it is too long, has a NUL or half a surrogate pair, or leads where none may look.
     """
+    if isinstance(path, str) and not path:
+        raise InputError("path: expected the name of a file, got an empty text")
     try:
         name = Path(path)  # type: ignore[arg-type]
     except TypeError:
