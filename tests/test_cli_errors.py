@@ -214,6 +214,13 @@ def test_bad_pictures(cli: Run, folder: Path) -> None:
     assert not Path("out.png").exists()
 
 
+def test_a_quilt_that_is_not_there_is_named_as_such(cli: Run, folder: Path) -> None:
+    for name in ("missing.png", "missing_qs4x2a1.png"):
+        for more in ((), ("--grid", "4x2")):
+            result = cli("weave", name, *more, "-d", "lenticular-8", "-o", "out.png")
+            refused(result, f"autostereo: error: {name}: no such file\n")
+
+
 def test_absurd_sizes_say_what_memory_they_would_take(
     cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
