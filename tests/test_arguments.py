@@ -121,3 +121,54 @@ def test_names_that_are_no_unicode(tmp_path):
     for path in (file, folder):
         with pytest.raises(aus.FileError, match="expected a name in UTF-8"):
             aus.load(path)
+
+
+STACK, QUILT = aus.ViewStack(np.zeros((6, 2, 2, 4), np.uint8)), np.zeros((6, 6, 3), np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: STACK.quilt(1.5, 4), "quilt columns: expected a whole number ≥ 1, got 1.5"),
+        (lambda: STACK.quilt(6, 1.5), "quilt rows: expected a whole number ≥ 1, got 1.5"),
+        (lambda: STACK.quilt("3", 2), "quilt columns: expected a whole number ≥ 1, got '3'"),
+        (lambda: STACK.quilt(True, 6), "quilt columns: expected a whole number ≥ 1, got True"),
+        (lambda: STACK.quilt(6, 0), "quilt rows: expected a whole number ≥ 1, got 0"),
+        (lambda: STACK.quilt(5, 1), "quilt: 5×1 tiles cannot hold 6 views"),
+        (lambda: aus.ViewStack.from_quilt(QUILT, 1.5, 2), "quilt columns: expected a whole number ≥ 1, got 1.5"),
+        (lambda: aus.ViewStack.from_quilt(QUILT, 3, None), "quilt rows: expected a whole number ≥ 1, got None"),
+        (lambda: aus.ViewStack.from_quilt(QUILT, 3, 2, views=7), "views: expected a whole number 1…6, got 7"),
+        (lambda: aus.ViewStack.from_quilt(QUILT, 3, 2, views=0), "views: expected a whole number 1…6, got 0"),
+        (lambda: aus.ViewStack.from_quilt(QUILT, 3, 2, views=2.0), "views: expected a whole number 1…6, got 2.0"),
+        (lambda: aus.ViewStack.from_quilt(QUILT, 7, 2, views=7), "quilt: 6×6 pixels cannot be 7×2 tiles"),
+        (lambda: aus.Rig().offset_at("x"), "u: expected numbers, got str"),
+        (lambda: aus.Rig().offset_at([0, None]), "u: expected numbers, got list"),
+        (lambda: aus.Rig().offset_at([0, True]), "u: expected numbers, got [0, True]"),
+        (lambda: aus.Rig().offset_at([0, np.nan]), "u: expected finite numbers, found infinite ones or NaN"),
+    ],
+)
+def test_tiles_and_places_of_cameras(call, message):
+    with pytest.raises(aus.InputError) as caught:
+        call()
+    assert str(caught.value) == message
+
+
+def test_numbers_of_numpy_are_as_good():
+    assert STACK.quilt(np.int64(3), np.uint8(2)).shape == (4, 6, 4)
+    assert aus.ViewStack.from_quilt(QUILT, np.int64(3), 2, np.int8(5)).views == 5
+    assert aus.Rig(offsets=(-1, 0, 2)).offset_at([0, 1.5, 3]).tolist() == [-1, 1, 4]
+    assert aus.Rig(offsets=(-1, 0, 2)).offset_at(1).shape == ()
+
+
+def test_no_name_is_not_the_current_folder(tmp_path, monkeypatch):
+    from autostereo.encoders import save
+
+    monkeypatch.chdir(tmp_path)
+    panel = aus.Panel(np.zeros((2, 2, 3), np.uint8))
+    doors = (STACK.save, panel.save, aus.Rig().save, aus.Rig.load, lambda path: save(STACK, path))
+    for door in doors:
+        with pytest.raises(aus.InputError, match="path: expected the name of a file, got an empty text"):
+            door("")
+    assert not list(tmp_path.iterdir())
+    STACK.save(".")
+    assert len(list(tmp_path.iterdir())) == 6

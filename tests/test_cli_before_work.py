@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import importlib
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from autostereo.cli.benchmarks import report
 from autostereo.cli.benchmarks.suite import BenchOptions
 from autostereo.errors import InputError
-from commandline import Run, refused
+from commandline import Run, files, refused
 
 
 @pytest.fixture
@@ -66,3 +69,56 @@ def test_simulated_numbers_of_views_and_machines_come_once(cli: Run, folder: Pat
     refused(cli("simulate", "level", "-n", "1,4,1"), "--views: expected each number once, got '1,4,1'")
     same = ("-m", "scanline", "-m", "scanline")
     refused(cli("simulate", "level", *same), "--machine: expected machines of different names, got scanline, scanline")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "size"),
+    [
+        ("render square.off -d lenticular-8 --size 16384x4 -o q.webp", "16384×4"),
+        ("render square.off -d lenticular-8 --size 4x16384 -o q.webp", "4×16384"),
+        ("weave a.png --grid 4x2 -d lenticular-8 --size 20000x20 -o q.webp", "20000×20"),
+        ("pattern -d lenticular-8 --size 20000x20 -o q.webp", "20000×20"),
+        ("quilt square.off --grid 2x1 --view-size 8192x20 -o q.webp", "16384×20"),
+        ("warp a.png a.npy -d lenticular-8 --size 20000x20 -o q.webp", "20000×20"),
+        ("observe wide.png -d lenticular-8 --view 0 -o q.webp", "16384×2"),
+    ],
+)
+def test_pictures_that_webp_cannot_hold(
+    arguments: str, size: str, cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def work(*_: object, **__: object) -> None:
+        raise AssertionError("there was work")
+
+    for module, name in (
+        ("render", "render"), ("render", "render_views"), ("render", "warp"), ("render", "observe"),
+        ("engines.cpu.gather", "weave"), ("cli.pattern", "spread"),
+    ):  # fmt: skip
+        monkeypatch.setattr(importlib.import_module(f"autostereo.{module}"), name, work)
+    Image.new("RGB", (40, 20)).save("a.png")
+    Image.new("RGB", (16384, 2)).save("wide.png")
+    np.save("a.npy", np.ones((20, 40), np.float32))
+    before = files(folder)
+    refused(cli(*arguments.split()), f".webp takes at most 16383 pixels a side, got {size}")
+    assert files(folder) == before
+
+
+def test_animations_have_room_beside_their_views(cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def work(*_: object, **__: object) -> None:
+        raise AssertionError("there was work")
+
+    Image.fromarray(np.zeros((800, 1000, 3), np.uint8)).save("a.png")
+    np.save("a.npy", np.ones((800, 1000), np.float32))
+    before = files(folder)
+    for verb in ("render_views", "warp"):
+        monkeypatch.setattr(importlib.import_module("autostereo.render"), verb, work)
+    monkeypatch.setattr("autostereo.memory.available_memory", lambda: 4 * 10 * 800_000 + 10_000_000)  # the views have
+    for suffix in ("gif", "webp", "mp4"):
+        message = f"a.{suffix}: an animation of 10 views of 1000×800 pixels would take 0."
+        views = ("-n", "10", "-o", f"a.{suffix}")
+        refused(cli("views", "square.off", *views, "--size", "1000x800"), message)
+        refused(cli("warp", "a.png", "a.npy", *views), message)
+    assert files(folder) == before
+
+
+def test_numbers_that_python_does_not_read_are_none(cli: Run, folder: Path) -> None:
+    refused(cli("render", "square.off", "-d", "lenticular-8", "--size", "1" * 5000 + "x9"), "--size: expected two whole")

@@ -214,10 +214,24 @@ def test_bad_pictures(cli: Run, folder: Path) -> None:
     assert not Path("out.png").exists()
 
 
+def test_a_quilt_that_is_not_there_is_named_as_such(cli: Run, folder: Path) -> None:
+    for name in ("missing.png", "missing_qs4x2a1.png"):
+        for more in ((), ("--grid", "4x2")):
+            result = cli("weave", name, *more, "-d", "lenticular-8", "-o", "out.png")
+            refused(result, f"autostereo: error: {name}: no such file\n")
+
+
 def test_absurd_sizes_say_what_memory_they_would_take(
     cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     refused(cli("views", "square.off", "-o", "out", "--views", "4096", "--size", "32768x32768"), "17592 GB")
+    takes = "--size: expected numbers from 1 to 32768, got {}; such a picture would take {} GB of memory\n"
+    for size, room in (("100000x100000", "30"), ("32769x1", "0.0000983")):
+        result = cli("render", "square.off", "-d", "lenticular-8", "--size", size)
+        refused(result, takes.format(size, room))
+    for size in ("0x100000", f"{10**31}x1"):
+        result = cli("pattern", "-d", "lenticular-8", "--size", size, "-o", "a.png")
+        refused(result, f"--size: expected numbers from 1 to 32768, got {size}\n")
     monkeypatch.setattr("autostereo.memory.available_memory", lambda: 10**8)
     refused(cli("render", "square.off", "-d", "looking-glass-portrait", "--size", "8192x8192"), "0.201 GB", "0.1 GB")
     assert files(folder) == {"square.off"}

@@ -299,3 +299,22 @@ def test_a_missing_folder_is_named(tmp_path, name):
 def test_a_folder_that_takes_no_files_is_named(name):
     with pytest.raises(FileError, match=rf"/proc/{name}: cannot be"):
         encoders.save(stack(4, 6, 8), f"/proc/{name}")
+
+
+@pytest.mark.parametrize(("suffix", "limit"), [(".webp", 16383), (".jpg", 65500), (".JPEG", 65500)])
+def test_pictures_are_as_large_as_their_format_holds(tmp_path: Path, suffix: str, limit: int) -> None:
+    path = tmp_path / f"a{suffix}"
+    for shape in ((1, limit, 3), (limit, 1, 3)):
+        assert read(Panel(np.zeros(shape, np.uint8)).save(path)).shape == shape
+        path.unlink()
+    for shape in ((1, limit + 1, 3), (limit + 1, 1, 3)):
+        message = rf"{suffix} takes at most {limit} pixels a side, got {shape[1]}×{shape[0]}$"
+        with pytest.raises(InputError, match=message):
+            Panel(np.zeros(shape, np.uint8)).save(path)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("suffix", [".png", ".tif", ".bmp"])
+def test_other_formats_hold_larger_ones(tmp_path: Path, suffix: str) -> None:
+    picture = random_pixels(1, 66000, 3)
+    assert np.array_equal(read(Panel(picture).save(tmp_path / f"a{suffix}")), picture)

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import importlib
+import subprocess
+import sys
 import tracemalloc
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import autostereo as aus
 from autostereo import Renderer
+from autostereo.encoders.video import animation_memory, save_animation
 from autostereo.memory import gigabytes
 from autostereo.scene.samples import surfel_cloud
 from gl_device import need_device
@@ -117,6 +121,52 @@ def test_software_opengl_asks_for_its_textures(monkeypatch: pytest.MonkeyPatch) 
         renderer.render(TABLE, RIG, method="n-pass")
     views, panel = RIG.views * PICTURE, 3 * PICTURE // 4
     assert asked == [views + 2 * views, 0, panel + PICTURE, 0]
+
+
+ANIMATE = """
+import re, sys
+import numpy as np
+from autostereo.encoders.video import save_animation
+from autostereo.frame import ViewStack
+
+def peak():
+    with open("/proc/self/status") as file:  # ru_maxrss begins with that of the process which started this one
+        return 1024 * int(re.search(r"VmHWM:\\s*(\\d+)", file.read())[1])
+
+path, views, width, height = sys.argv[1], *map(int, sys.argv[2:])
+color = np.empty((views, height, width, 4), np.uint8)
+x, y = np.arange(width, dtype=np.uint16), np.arange(height, dtype=np.uint16)[:, None]
+for k, view in enumerate(color):
+    view[..., 0], view[..., 1], view[..., 2] = x // 8 + 3 * k, x // 8 ^ y // 8, y // 8 + k
+save_animation(path, ViewStack(color[:, :16, :16]))  # imports
+before = peak()
+save_animation(path, ViewStack(color))
+print(peak() - before)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux has /proc/self/status")
+@pytest.mark.parametrize("suffix", [".gif", ".webp", ".mp4"])
+def test_animations_ask_for_what_their_writers_take(suffix: str, tmp_path: Path) -> None:
+    """Peak memory of a process of its own, as Pillow's and the encoders' is none of Python's."""
+    if suffix == ".mp4":
+        pytest.importorskip("av")
+    views, width, height = 24, 1024, 512
+    command = [sys.executable, "-c", ANIMATE, f"a{suffix}", *map(str, (views, width, height))]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    asked, taken = animation_memory(suffix, views, width, height), int(done.stdout)
+    assert taken - SMALL <= asked
+    assert asked <= 4 * taken + 2 * SMALL
+    assert suffix == ".mp4" or taken < 4 * views * width * height  # that is the views; copies took more than they do
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".webp", ".mp4"])
+def test_animations_without_room_are_refused(suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("autostereo.memory.available_memory", lambda: 10**6)
+    views = aus.ViewStack(np.zeros((12, 200, 300, 4), np.uint8))
+    with pytest.raises(aus.MemoryLimitError, match=r"animation of 12 views of 300×200 pixels would take 0\.\d+ GB"):
+        save_animation(tmp_path / f"a{suffix}", views)
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .checks import check_unmasked
+from .checks import check_count, check_unmasked
 from .errors import FileError, InputError
 from .image import as_path, write_atomic, write_image
 from .memory import check_memory
@@ -70,7 +70,8 @@ class ViewStack:
         -------
         ndarray of shape (R·H, C·W, 4), uint8
         """
-        if columns < 1 or rows < 1 or columns * rows < self.views:
+        columns, rows = check_count("quilt columns", columns), check_count("quilt rows", rows)
+        if columns * rows < self.views:
             raise InputError(f"quilt: {columns}×{rows} tiles cannot hold {counted(self.views, 'view')}")
         check_memory(4 * rows * self.height * columns * self.width, f"a quilt of {columns}×{rows} tiles")
         quilt = np.zeros((rows, self.height, columns, self.width, 4), dtype=np.uint8)
@@ -89,10 +90,11 @@ class ViewStack:
         quilt = np.asarray(quilt)
         if quilt.ndim != 3 or quilt.shape[2] not in (3, 4) or quilt.dtype != np.uint8:
             raise InputError(f"quilt: expected (H, W, 3 or 4) uint8, got {quilt.shape} {quilt.dtype}")
-        count = columns * rows if views is None else views
-        height, width = quilt.shape[0] // max(rows, 1), quilt.shape[1] // max(columns, 1)
-        if columns < 1 or rows < 1 or not 1 <= count <= columns * rows or height < 1 or width < 1:
+        columns, rows = check_count("quilt columns", columns), check_count("quilt rows", rows)
+        height, width = quilt.shape[0] // rows, quilt.shape[1] // columns
+        if height < 1 or width < 1:
             raise InputError(f"quilt: {quilt.shape[1]}×{quilt.shape[0]} pixels cannot be {columns}×{rows} tiles")
+        count = columns * rows if views is None else check_count("views", views, columns * rows)
         color = np.full((count, height, width, 4), 255, dtype=np.uint8)
         bottom = quilt.shape[0]
         for k in range(count):

@@ -17,6 +17,7 @@ from .temporary import holding
 from .wording import no_folder
 
 IMAGE_SUFFIXES = (".png", ".webp", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
+MAX_SIDE = {".webp": 16383, ".jpg": 65500, ".jpeg": 65500, ".gif": 65535, ".mp4": 16384}  # pixels that encoders take
 
 
 def as_path(path: object) -> Path:
@@ -25,10 +26,12 @@ def as_path(path: object) -> Path:
     Raises
     ------
     InputError
-        It is of a type that names no file.
+        It is of a type that names no file, or an empty text, which `Path` takes for the current folder.
     FileError
         The system refuses the name: it is too long, has a NUL or half a surrogate pair, or leads where none may look.
     """
+    if isinstance(path, str) and not path:
+        raise InputError("path: expected the name of a file, got an empty text")
     try:
         name = Path(path)  # type: ignore[arg-type]
     except TypeError:
@@ -68,6 +71,13 @@ def write_atomic(path: str | os.PathLike[str], write: Callable[[BinaryIO], objec
     return path
 
 
+def check_side(path: Path, width: int, height: int) -> None:
+    """Raise InputError for a picture that is larger than its format allows."""
+    limit = MAX_SIDE.get(path.suffix.lower())
+    if limit is not None and max(width, height) > limit:
+        raise InputError(f"{path}: {path.suffix} takes at most {limit} pixels a side, got {width}×{height}")
+
+
 def write_image(path: str | os.PathLike[str], pixels: NDArray[np.uint8]) -> Path:
     """Write (H, W, 3|4) uint8 pixels, rows from the top; the suffix chooses the format.
 
@@ -81,6 +91,7 @@ def write_image(path: str | os.PathLike[str], pixels: NDArray[np.uint8]) -> Path
     pixels = np.ascontiguousarray(pixels)
     if pixels.dtype != np.uint8 or pixels.ndim != 3 or pixels.shape[2] not in (3, 4):
         raise InputError(f"pixels: expected (H, W, 3 or 4) uint8, got {pixels.shape} {pixels.dtype}")
+    check_side(path, pixels.shape[1], pixels.shape[0])
     image = Image.fromarray(pixels)
     of_kind: dict[str, dict[str, Any]] = {".png": {"compress_level": 1}, ".webp": {"lossless": True, "method": 0}}
     options = of_kind.get(path.suffix.lower(), {"quality": 95})

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..checks import shown
 from ..errors import FileError, InputError, MemoryLimitError
 
 if TYPE_CHECKING:
@@ -101,20 +102,25 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", callback=_set_quiet, help=
 
 
 # --- reading of values ---------------------------------------------------------------------------------------------
-def parse_pair(text: str, name: str, high: int) -> tuple[int, int]:
-    """Read "AxB" as two whole numbers in 1…high."""
+def parse_pair(text: str, name: str, high: int, picture: bool = False) -> tuple[int, int]:
+    """Read "AxB" as two whole numbers in 1…high; of a `picture` that is too large an error says what it would take."""
     parts = text.lower().replace("×", "x").split("x")
-    if len(parts) != 2 or not all(part.strip().isascii() and part.strip().isdigit() for part in parts):
-        raise InputError(f"{name}: expected two whole numbers such as 420x560, got {text!r}")
+    whole = [part.strip() for part in parts if part.strip().isascii() and part.strip().isdigit()]
+    if len(parts) != 2 or len(whole) != 2 or max(map(len, whole)) > 99:  # Python reads no more than 4300 digits
+        raise InputError(f"{name}: expected two whole numbers such as 420x560, got {shown(text)}")
     first, second = (int(part) for part in parts)
     if not (1 <= first <= high and 1 <= second <= high):
-        raise InputError(f"{name}: expected numbers from 1 to {high}, got {text}")
+        from ..memory import gigabytes
+
+        large = picture and 0 < first * second < 1e30
+        takes = f"; such a picture would take {gigabytes(3 * first * second)} of memory" if large else ""
+        raise InputError(f"{name}: expected numbers from 1 to {high}, got {text}{takes}")
     return first, second
 
 
 def parse_size(text: str, name: str = "--size") -> tuple[int, int]:
     """Read "WxH" in pixels."""
-    return parse_pair(text, name, MAX_SIDE)
+    return parse_pair(text, name, MAX_SIDE, picture=True)
 
 
 def parse_numbers(text: str, name: str, count: int) -> tuple[float, ...]:

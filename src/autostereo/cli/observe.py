@@ -60,6 +60,7 @@ def observe(
             "give a .toml of your own with size_mm below [optics], or --view U"
         )
     pixels = common.load_picture(panel)
+    outputs.check_image(output, (pixels.shape[1], pixels.shape[0]))
     width, height = where.picture_size
     if pixels.shape[:2] != (height, width) and where.viewmap is not None:
         where = where.resized(pixels.shape[1], pixels.shape[0])

@@ -73,11 +73,14 @@ def check_apart(output: Path, *inputs: Path) -> None:
         raise InputError(f"{output}: is also an input, which would be lost; give the output another name")
 
 
-def check_image(path: Path) -> Path:
-    """`check_output` for an image file."""
-    from ..image import IMAGE_SUFFIXES
+def check_image(path: Path, size: tuple[int, int] | None = None) -> Path:
+    """`check_output` for an image file, of so many pixels across and down if that is known."""
+    from ..image import IMAGE_SUFFIXES, check_side
 
-    return check_output(path, IMAGE_SUFFIXES)
+    check_output(path, IMAGE_SUFFIXES)
+    if size is not None:
+        check_side(path, *size)
+    return path
 
 
 def note_ending(path: Path, ending: str) -> None:

@@ -69,7 +69,7 @@ def pattern(
     if step is not None and not 0 < abs(step) * strips < 2:
         raise InputError(f"--step: expected a number other than 0 and within ±{2 / strips:.3g}, got {step:g}")
     where = common.load_display(display, size, swap, views)
-    outputs.check_image(output)
+    outputs.check_image(output, where.picture_size)
     with common.working("drawing"):
         if kind in STEPS:
             sweep = make_sweep(where, kind, strips, width)

@@ -77,7 +77,8 @@ def quilt(
     rig = common.load_camera(camera)
     from ..encoders.quilt import quilt_path
 
-    path = outputs.check_image(quilt_path(_place(output, f"{common.stem(inputs[0])}.png"), layout))
+    path = quilt_path(_place(output, f"{common.stem(inputs[0])}.png"), layout)
+    outputs.check_image(path, (layout.width, layout.height))
     outputs.check_apart(path, *inputs)
     scene = common.load_scene(inputs, background, volumes)
     common.note_idle(options, scene, method)

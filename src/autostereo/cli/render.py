@@ -68,7 +68,7 @@ def render(
     common.check_side(side, camera)
     rig = common.load_camera(camera)
     own = f"{common.stem(inputs[0])}_{common.slug(display)}{where.ending}.png"
-    path = outputs.check_image(output or Path(own))
+    path = outputs.check_image(output or Path(own), where.picture_size)
     outputs.check_apart(path, *inputs)
     scene = common.load_scene(inputs, background, volumes)
     common.note_idle(options, scene, method)

@@ -101,6 +101,8 @@ def views(
     if lens is not None:
         options = replace(options, aperture=rig.focal / 50 if aperture is None else aperture, lens=samples_of_lens)
 
+    if suffix in ANIMATIONS:
+        check_animation_room(path, rig.views, pixels, 4)
     from ..render import render_views
 
     drawn = partial(render_views, scene, rig, pixels, method=method, engine=engine)
@@ -130,10 +132,15 @@ def check_animation(path: Path, size: tuple[int, int]) -> None:
     """Refuse, before the long work, an animation that could not be written after it."""
     from importlib.util import find_spec
 
-    from ..encoders.video import MAX_SIDE
+    from ..image import check_side
 
-    limit = MAX_SIDE[path.suffix.lower()]
-    if max(size) > limit:
-        raise InputError(f"{path}: {path.suffix} takes at most {limit} pixels a side, got {size[0]}×{size[1]}")
+    check_side(path, *size)
     if path.suffix.lower() == ".mp4" and find_spec("av") is None:
         raise DependencyError(f"{path}: mp4 needs PyAV; pip install autostereo[video]")
+
+
+def check_animation_room(path: Path, views: int, size: tuple[int, int], held: int) -> None:
+    """Refuse, before the long work, an animation without room beside its views, of `held` bytes a pixel."""
+    from ..encoders.video import check_room
+
+    check_room(path, views, size, held * views * size[0] * size[1])

@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..wording import an, counted
 from . import common, outputs
 from .common import note, say
-from .views import ANIMATIONS, check_animation, write_views
+from .views import ANIMATIONS, check_animation, check_animation_room, write_views
 
 if TYPE_CHECKING:
     from ..display.display import Display
@@ -62,7 +62,11 @@ def warp(
     if where is not None and where.viewmap is None and to_panel:
         raise InputError(f"{where.name}: {an(where.layout)} picture is not interlaced; leave out --display for views")
     common.check_views(views)
-    outputs.check_output(path, (suffix,) if suffix else ())
+    if to_panel:
+        assert where is not None
+        outputs.check_image(path, where.picture_size)
+    else:
+        outputs.check_output(path, (suffix,) if suffix else ())
     outputs.check_apart(path, picture, depth)
     rig = common.load_camera(camera)
     field = rig.fov_y if rig is not None else 36.0 if fov is None else fov
@@ -82,6 +86,8 @@ def warp(
         assert taken.depth is not None
         rig = frame_depths(taken.depth[0], target, field)
     rig = replace(rig.with_views(target.views), fov_y=field, aspect=taken.width / taken.height)
+    if suffix in ANIMATIONS and not to_panel:
+        check_animation_room(path, rig.views, (taken.width, taken.height), 8)  # color and depth
     with common.working(f"warping to {counted(rig.views, 'view')}"):
         stack = draw(taken, rig)
     if to_panel:

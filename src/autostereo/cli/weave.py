@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..errors import InputError
+from ..errors import FileError, InputError
 from ..wording import an, counted
 from . import common, outputs
 from .common import note, say
@@ -40,7 +40,8 @@ def weave(
     from ..encoders.quilt import parse_quilt_name
 
     named = parse_quilt_name(quilt)
-
+    if not quilt.exists():
+        raise FileError(f"{quilt}: no such file")
     if grid is not None:
         columns, rows = common.parse_pair(grid, "--grid", 1024)
     elif named is not None:
@@ -58,7 +59,7 @@ def weave(
         )
     if where.viewmap is None:
         raise InputError(f"{where.name}: {an(where.layout)} picture is not woven from a quilt")
-    outputs.check_image(output)
+    outputs.check_image(output, where.picture_size)
     outputs.check_apart(output, quilt)
     pixels = common.load_picture(quilt, alpha=True)
     from ..engines.cpu.gather import weave as draw

@@ -140,7 +140,10 @@ class Rig:
 
     def offset_at(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Camera offset at camera coordinates u: piecewise linear through the cameras, continued beyond the ends."""
-        return offset_at(self.camera_offsets, u)
+        places = plain_numbers("u", u)
+        if not np.isfinite(places).all():
+            raise InputError("u: expected finite numbers, found infinite ones or NaN")
+        return offset_at(self.camera_offsets, places)
 
     @cached_property
     def eye_from_world(self) -> NDArray[np.float64]:

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from ..errors import DependencyError, FileError, InputError, UnsupportedError
 from ..frame import ViewStack
-from ..image import as_path, write_atomic
+from ..image import as_path, check_side, write_atomic
+from ..memory import check_memory
+from ..wording import counted
 
 if TYPE_CHECKING:
     from PIL import Image
 
 ANIMATION_SUFFIXES = (".gif", ".webp", ".mp4")
-MAX_SIDE = {".gif": 65535, ".webp": 16383, ".mp4": 16384}
 H264_PIXELS, H264_SIDE = 4096 * 2304, 4096  # level 5.2, the last that common decoders take
 SWING_SECONDS = 3.0  # there and back, as far as 10…30 frames a second allow
 
@@ -49,6 +50,8 @@ def save_animation(path: str | os.PathLike[str], views: ViewStack, fps: float | 
         Unknown suffix, a wrong `fps`, or pictures larger than the format allows.
     FileError
         The file cannot be written; nothing is left behind.
+    MemoryLimitError
+        There is no room for what its writer holds.
     DependencyError
         MP4 needs PyAV, `pip install autostereo[video]`.
     """
@@ -61,36 +64,66 @@ def save_animation(path: str | os.PathLike[str], views: ViewStack, fps: float | 
         fps = min(max(len(order) / SWING_SECONDS, 10.0), 30.0)
     if not 0.1 <= fps <= 100:
         raise InputError(f"fps: expected 0.1…100 frames a second, got {fps!r}")
-    if max(views.width, views.height) > MAX_SIDE[suffix]:
-        limit = MAX_SIDE[suffix]
-        raise InputError(f"{path}: {suffix} takes at most {limit} pixels a side, got {views.width}×{views.height}")
+    check_side(path, views.width, views.height)
+    copies = 0 if suffix != ".webp" or views.color[0].flags.c_contiguous else views.color.nbytes
+    check_room(path, views.views, (views.width, views.height), copies)
     if suffix == ".mp4":
         return _save_mp4(path, views, fps)
-    images = _gif_images(views) if suffix == ".gif" else _images(views)
-    frames = [images[k] for k in order]
-    options: dict[str, Any] = {"duration": round(1000 / fps), "loop": 0, "save_all": True, "append_images": frames[1:]}
+    frames = _gif_frames(views) if suffix == ".gif" else _frames(views)
+    first = next(frames)
+    options: dict[str, Any] = {"duration": round(1000 / fps), "loop": 0, "save_all": True, "append_images": frames}
     if suffix == ".gif":
         options |= {"duration": 10 * max(1, round(100 / fps)), "optimize": False, "disposal": 1}
     else:
         options |= {"quality": 90, "method": 2}
-    return write_atomic(path, lambda file: frames[0].save(file, format=suffix[1:], **options))
+    return write_atomic(path, lambda file: first.save(file, format=suffix[1:], **options))
 
 
-def _images(views: ViewStack) -> list[Image.Image]:
+def check_room(path: Path, views: int, size: tuple[int, int], beside: int = 0) -> None:
+    """Raise MemoryLimitError unless there is room for an animation and `beside` bytes more, such as its views."""
+    need = beside + animation_memory(path.suffix.lower(), views, *size)
+    check_memory(need, f"{path}: an animation of {counted(views, 'view')} of {size[0]}×{size[1]} pixels")
+
+
+def animation_memory(suffix: str, views: int, width: int, height: int) -> int:
+    """Bytes that writing an animation takes beside its views, as measured of pictures of scenes.
+
+    GIF's writer holds a byte a pixel of all frames of the loop; WebP's their files, some hundredths to half a byte, of
+    mere noise five. Encoders of MP4 hold the frames that they look ahead, and one for each thread.
+    """
+    loop = len(sweep(views))
+    held = loop + 20
+    if suffix == ".mp4" and _is_large(width, height):
+        held = 10 * min(loop, 30) + 25
+    elif suffix == ".mp4":
+        held = 6 * min(loop, 40 + 3 * (os.cpu_count() or 1) // 2) + 25
+    return held * width * height
+
+
+def _frames(views: ViewStack) -> Iterator[Image.Image]:
+    """Frames of one loop in the memory that the stack has: WebP's writer holds them all."""
+    images = [_image(views, k) for k in range(views.views)]
+    yield from (images[k] for k in sweep(views.views))
+
+
+def _image(views: ViewStack, k: int) -> Image.Image:
+    """View k without its opacity."""
     from PIL import Image
 
-    return [Image.fromarray(np.ascontiguousarray(view[..., :3])) for view in views.color]
+    size = (views.width, views.height)
+    return Image.frombuffer("RGBX", size, np.ascontiguousarray(views.color[k]), "raw", "RGBX", 0, 1)
 
 
-def _gif_images(views: ViewStack) -> list[Image.Image]:
-    """The views in one palette, chosen from up to 16 of them, thinned."""
+def _gif_frames(views: ViewStack) -> Iterator[Image.Image]:
+    """Frames of one loop in one palette, chosen from up to 16 of the views, thinned; GIF's writer holds copies."""
     from PIL import Image
 
     chosen = np.unique(np.linspace(0, views.views - 1, 16).astype(int))
     step = max(1, math.isqrt(views.height * views.width // 2**16))
     sample = np.concatenate(list(views.color[chosen, ::step, ::step, :3]))
     palette = Image.fromarray(sample).quantize(256, method=Image.Quantize.MEDIANCUT)
-    return [image.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG) for image in _images(views)]
+    for k in sweep(views.views):
+        yield _image(views, k).convert("RGB").quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG)
 
 
 def _save_mp4(path: Path, views: ViewStack, fps: float) -> Path:
@@ -105,6 +138,11 @@ def _save_mp4(path: Path, views: ViewStack, fps: float) -> Path:
         raise FileError(f"{path}: cannot be written as mp4 ({error.strerror or error})") from error
 
 
+def _is_large(width: int, height: int) -> bool:
+    """Whether H.264 cannot hold pictures of that size."""
+    return height * width > H264_PIXELS or max(height, width) > H264_SIDE
+
+
 def _even_frames(views: ViewStack) -> Iterator[NDArray[np.uint8]]:
     """Frames (H, W, 3) of one loop, with the last row and column repeated where H or W is odd."""
     padding = ((0, views.height % 2), (0, views.width % 2), (0, 0))
@@ -117,7 +155,7 @@ def _encode(file: BinaryIO, views: ViewStack, fps: float) -> None:
     import av
 
     height, width = views.height + views.height % 2, views.width + views.width % 2
-    large = height * width > H264_PIXELS or max(height, width) > H264_SIDE
+    large = _is_large(width, height)
     codec = "libx265" if large else "libx264"
     if codec not in av.codecs_available:
         raise UnsupportedError(f"mp4: this PyAV lacks {codec}; its wheels from PyPI have it")
