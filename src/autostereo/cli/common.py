@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..checks import shown
 from ..errors import FileError, InputError, MemoryLimitError
 
 if TYPE_CHECKING:
@@ -107,7 +106,7 @@ def parse_pair(text: str, name: str, high: int, picture: bool = False) -> tuple[
     parts = text.lower().replace("×", "x").split("x")
     whole = [part.strip() for part in parts if part.strip().isascii() and part.strip().isdigit()]
     if len(parts) != 2 or len(whole) != 2 or max(map(len, whole)) > 99:  # Python reads no more than 4300 digits
-        raise InputError(f"{name}: expected two whole numbers such as 420x560, got {shown(text)}")
+        raise InputError(f"{name}: expected two whole numbers such as 420x560, got {text[:60]!r}")
     first, second = (int(part) for part in parts)
     if not (1 <= first <= high and 1 <= second <= high):
         from ..memory import gigabytes
