@@ -121,4 +121,5 @@ def test_animations_have_room_beside_their_views(cli: Run, folder: Path, monkeyp
 
 
 def test_numbers_that_python_does_not_read_are_none(cli: Run, folder: Path) -> None:
-    refused(cli("render", "square.off", "-d", "lenticular-8", "--size", "1" * 5000 + "x9"), "--size: expected two whole")
+    size = "1" * 5000 + "x9"
+    refused(cli("render", "square.off", "-d", "lenticular-8", "--size", size), "--size: expected two whole")
