@@ -14,13 +14,11 @@ from .simd import (
     LANES,
     bits,
     first_fours,
-    greater,
     high_halves,
     high_pairs,
     iota,
     keep_greater,
     last_fours,
-    lesser,
     low_halves,
     low_pairs,
     select,
@@ -39,8 +37,8 @@ def hit(x, offset, ends, depths):
     """Which of eight samples a segment covers from the cameras at `offset`, inverse depths, perspective parameters.
 
     With w = right − left and n = x − left: 1/depth = z1 + (n/w)·(z2 − z1) = q/w for q = z1·w + n·(z2 − z1), and
-    the parameter is u = n·z2/q; one division serves both. Every draw uses this one expression. Kept between its ends, a
-    segment that all cameras see at one depth has no other, and coplanar ones tie.
+    the parameter is u = n·z2/q; one division serves both. Every draw uses this one expression. Rounding must not part
+    what lies at one depth for all cameras, so that coplanar triangles tie.
     """
     x1, p1, x2, p2 = ends
     z1, z2 = depths
@@ -50,7 +48,7 @@ def hit(x, offset, ends, depths):
     n = x - left
     q = w * z1 + n * (z2 - z1)
     r = ONE / (w * q)
-    z = lesser(greater(q * q * r, min(z1, z2)), max(z1, z2))
+    z = splat(z1) if z1 == z2 else q * q * r
     return (left <= x) & (x < right), z, n * z2 * (w * r)
 
 
