@@ -69,7 +69,7 @@ def test_eye_needs_a_display_with_a_size(cli: Run, folder: Path) -> None:
 def test_options_that_nothing_in_the_picture_asks_for_are_named(cli: Run, folder: Path) -> None:
     render = ("render", "square.off", *LENSES, *SMALL, "-o", "p.png")
     result = cli(*render, "--references", "3", "--step", "0.5", "--small-size", "8x8", "--alpha", "averaged")
-    assert result.status == 0 and "without effect here: --step, --small-size, --references\n" in result.err
+    assert result.status == 0 and "without effect here: --alpha, --step, --small-size, --references\n" in result.err
     assert "without effect" not in cli(*render, "--method", "n-pass-subres", "--small-size", "8x8").err
     assert "without effect" not in cli(*render, "--method", "dibr", "--references", "3").err
     views = ("views", "square.off", "--views", "2", "--size", "16x16", "-o", "v.npz")

@@ -246,7 +246,8 @@ def test_a_byte_order_mark_hides_neither_the_library_nor_its_first_material(tmp_
 def test_bad_mtl(tmp_path):
     text = SQUARE + "usemtl a\nf 1 2 3 4\n"
     refused(obj(tmp_path, text, "newmtl a\nKd red\n"), "a.mtl: expected numbers for Kd, found 'red'")
-    refused(obj(tmp_path, text, "newmtl a\nmap_Kd -s 1 inf a.png\n"), "a.mtl: expected finite numbers for map_Kd -s")
+    for far in ("inf", "1e300"):
+        refused(obj(tmp_path, text, f"newmtl a\nmap_Kd -s 1 {far} a.png\n"), "a.mtl: expected numbers within ±1e+06")
     refused(obj(tmp_path, text, "newmtl a\nKd nan 0 0\n"), "a.mtl: expected finite numbers for Kd")
     refused(obj(tmp_path, text, "\x89PNG\r\n\x1a\n\x00\x00"), "a.mtl: is not a library of materials (MTL)")
 

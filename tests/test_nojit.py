@@ -184,6 +184,13 @@ def test_single_pass_is_n_passes_for_points_among_meshes(name):
         assert_one_pass_is_many(aus.Scene(objects, LIGHTS), DISPLAYS[name])
 
 
+def test_a_wide_single_view_of_points_stays_within_its_memory():
+    """Lanes beyond the last view have no samples; what they would read lay behind a thread's memory."""
+    cloud = aus.Points(np.random.default_rng(0).normal(size=(6, 3)) * 0.3, radii=0.05)
+    found = aus.render_views(cloud, replace(RIG, views=1), (4000, 2), engine="cpu")
+    assert found.color[..., 3].any()
+
+
 def test_points_are_those_of_the_reference():
     content = aus.Scene(cloud(3), LIGHTS)
     found, expected = (views(content, engine=e, depth=True) for e in ("cpu", "reference"))

@@ -148,7 +148,7 @@ def test_bad_input_is_one_sentence(tmp_path):
     stack = ramps(2, 8, 8)
     with pytest.raises(InputError, match=r"expected an animation \(.gif .webp .mp4\), got '.avi'"):
         save_animation(tmp_path / "a.avi", stack)
-    for fps in (0, -1, 1000, float("nan")):
+    for fps in (0, -1, 1000, float("nan"), "3", True):
         with pytest.raises(InputError, match="fps"):
             save_animation(tmp_path / "a.gif", stack, fps)
     with pytest.raises(InputError, match=r"at most 16383 pixels a side, got 16400×1"):

@@ -231,6 +231,13 @@ def test_single_pass_is_n_passes_for_random_triangles_and_rigs(engine, seed, bas
         assert_one_pass_is_many(soup(seed, count=14), DISPLAYS[name], rig, engine)
 
 
+@pytest.mark.parametrize("baseline", [1e-20, 1e-34, 1e-40, 1e-200, 1e-310, 5e-324])
+def test_single_pass_is_n_passes_for_cameras_that_hardly_differ(engine, baseline):
+    """Where pixels per unit of offset are more than numbers hold."""
+    need(engine)
+    assert_one_pass_is_many(soup(1, count=14), DISPLAYS["slanted physical"], replace(RIG, baseline=baseline), engine)
+
+
 def test_continuous_panel_is_interlaced_from_the_cameras_it_asks_for(engine):
     """A phase that repeats asks for few cameras: drawn as views, they give the continuous panel bit for bit."""
     need(engine)

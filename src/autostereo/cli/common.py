@@ -203,7 +203,7 @@ def note_idle(options: Options, scene: Scene, method: str) -> None:
     used = {
         "step": volumes,
         "volume": volumes,
-        "alpha": method in ("single-pass", "covering-quad"),
+        "alpha": method == "covering-quad" or (volumes and method == "single-pass"),
         "views_per_pass": method.startswith("geometry-shader"),
         "small_size": method == "n-pass-subres",
         "groups": points and method == "covering-quad" and options.alpha != "exact",

@@ -42,6 +42,8 @@ def weave(
     named = parse_quilt_name(quilt)
     if not quilt.exists():
         raise FileError(f"{quilt}: no such file")
+    if quilt.is_dir():
+        raise FileError(f"{quilt}: is a folder, not a file")
     if grid is not None:
         columns, rows = common.parse_pair(grid, "--grid", 1024)
     elif named is not None:

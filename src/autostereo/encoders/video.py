@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import check_number
 from ..errors import DependencyError, FileError, InputError, UnsupportedError
 from ..frame import ViewStack
 from ..image import as_path, check_side, write_atomic
@@ -62,8 +63,7 @@ def save_animation(path: str | os.PathLike[str], views: ViewStack, fps: float | 
     order = sweep(views.views)
     if fps is None:
         fps = min(max(len(order) / SWING_SECONDS, 10.0), 30.0)
-    if not 0.1 <= fps <= 100:
-        raise InputError(f"fps: expected 0.1…100 frames a second, got {fps!r}")
+    fps = check_number("fps", fps, 0.1, 100)
     check_side(path, views.width, views.height)
     copies = 0 if suffix != ".webp" or views.color[0].flags.c_contiguous else views.color.nbytes
     check_room(path, views.views, (views.width, views.height), copies)
@@ -88,11 +88,12 @@ def check_room(path: Path, views: int, size: tuple[int, int], beside: int = 0) -
 def animation_memory(suffix: str, views: int, width: int, height: int) -> int:
     """Bytes that writing an animation takes beside its views, as measured of pictures of scenes.
 
-    GIF's writer holds a byte a pixel of all frames of the loop; WebP's their files, some hundredths to half a byte, of
-    mere noise five. Encoders of MP4 hold the frames that they look ahead, and one for each thread.
+    GIF's writer holds a byte a pixel of all frames of the loop, half a byte more where every pixel changes, of mere
+    noise four; WebP's their files, some hundredths to half a byte, of mere noise five. Encoders of MP4 hold the frames
+    that they look ahead, and one for each thread.
     """
     loop = len(sweep(views))
-    held = loop + 20
+    held = loop + loop // 2 + 20
     if suffix == ".mp4" and _is_large(width, height):
         held = 10 * min(loop, 30) + 25
     elif suffix == ".mp4":

@@ -18,6 +18,7 @@ from .image import read_image
 from .mesh import usable_normals
 from .polygons import triangulate, weld
 
+FARTHEST_UV = 1e6  # repeats of a texture
 # options of map_Kd and how many words follow them; the file name is what comes after
 _MAP_OPTIONS = {
     b"-blendu": 1, b"-blendv": 1, b"-bm": 1, b"-boost": 1, b"-cc": 1, b"-clamp": 1, b"-imfchan": 1,
@@ -317,8 +318,8 @@ def _map(rest: bytes, path: PathLike) -> tuple[bytes, dict[bytes, list[float]]]:
             rest = tail
         if option in given:
             given[option] = numbers(words, path, f"map_Kd {option.decode()}").tolist()
-            if not np.isfinite(given[option]).all():
-                raise FileError(f"{path}: expected finite numbers for map_Kd {option.decode()}")
+            if not (np.abs(given[option]) <= FARTHEST_UV).all():
+                raise FileError(f"{path}: expected numbers within ±{FARTHEST_UV:g} for map_Kd {option.decode()}")
         rest = rest.lstrip()
     return rest.strip().strip(b'"'), given
 

@@ -23,11 +23,12 @@ from .scalars import ZERO
 from .view_rows import MapArgs, cell_of, map_args
 
 MAX_PERIOD = 64
+MOST_LEAN = 1e30  # what float32 holds, and products with it
 NEAR_WRAP = 1e-6  # of a phase: rounding may put a sample on either side of a wrap, so both lines hold it
 BUCKET = 4  # lines are sorted into buckets of 2⁴ pixels
 PARALLAX = (-0.125, -0.0625, 0.0, 0.0625)  # panel widths: parallax between the outermost cameras to reckon with
 SEGMENT = 5.0  # pixels: width of a segment to reckon with
-LONG = 4  # panel widths: lines that cross all offsets in no less are hardly more than the residues of the period
+LONG = 2  # panel widths: lines that take longer to the middle offset are hardly more than the residues of the period
 
 
 class LinePlan(NamedTuple):
@@ -66,13 +67,11 @@ def plan_lines(viewmap: ViewMap, width: int, flip: bool, offsets: NDArray[np.flo
     first, slope, misfit, low, high = _fit(viewmap, offsets)
     period, step = _period(viewmap, width, -1.0 if (slope < 0.0) != flip else 1.0)
     step = -step if flip else step
-    across = period / max(abs(step), 1e-9)  # pixels in which a line crosses all offsets
     spacing, middle = _even(offsets)
-    if slope == 0.0 or across > LONG * width:
-        lean, lead, reach = 0.0, 0.0, min(float(width), across) + period
-    else:
-        lean = period / (slope * step)
-        lead, reach = (0.5 * (high - low) + misfit) * abs(lean), 0.0
+    lean = period / (slope * step) if slope * step != 0.0 else np.inf
+    lead, reach = (0.5 * (high - low) + misfit) * abs(lean), 0.0
+    if not (lead <= LONG * width and abs(lean) <= MOST_LEAN):  # offsets that follow the phase hardly, too
+        lean, lead, reach = 0.0, 0.0, min(float(width), period / max(abs(step), 1e-9)) + period
     return LinePlan(m, offsets, period, step, first, slope, misfit, low, high, lean, lead, reach, spacing, middle)
 
 
@@ -188,17 +187,22 @@ def row_offsets(row, width, flip, columns, base, x0, plane, plan, u, out):
 
 
 @inlined
+def middle_offset(plan):
+    """The offset at which lines are sorted."""
+    return np.float32(0.5 * (plan.low + plan.high))
+
+
+@inlined
 def bucket_at(x, plan, x0, buckets):
     """The bucket of lines that cross the middle offset at pixel x, the first or last where that is far away."""
-    place = (x - np.float32(x0)) + np.float32(plan.lead)
-    return np.int64(min(max(place, ZERO), np.float32((buckets << BUCKET) - 1))) >> BUCKET
+    place = min(max((x - np.float32(x0)) + np.float32(plan.lead), ZERO), np.float32(buckets << BUCKET))
+    return min(max(np.int64(place) >> BUCKET, 0), buckets - 1)
 
 
 @inlined
 def bucket_of(x, offset, plan, x0, buckets):
     """The bucket of a line through pixel x at a camera offset."""
-    middle = np.float32(0.5 * (plan.low + plan.high))
-    return bucket_at(x - (offset - middle) * np.float32(plan.lean), plan, x0, buckets)
+    return bucket_at(x - (offset - middle_offset(plan)) * np.float32(plan.lean), plan, x0, buckets)
 
 
 @inlined

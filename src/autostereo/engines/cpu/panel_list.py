@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined
-from .panel_lines import bucket_at
-from .scalars import HALF, ONE, ZERO
+from .panel_lines import bucket_at, middle_offset
+from .scalars import ONE, ZERO
 from .simd import (
     LANES,
     append,
@@ -118,10 +118,12 @@ def lines_met(ends, place, starts):
     """The lines that a stretch may meet, first and behind the last."""
     x1, p1, x2, p2 = ends
     plan, buckets = place.plan, starts.shape[0] - 1
-    low, high, misfit = np.float32(plan.low), np.float32(plan.high), np.float32(plan.misfit)
-    lean, middle, half = np.float32(plan.lean), HALF * (low + high), HALF * (high - low) + misfit
+    lean, middle, misfit = np.float32(plan.lean), middle_offset(plan), np.float32(plan.misfit)
+    half = np.float32(0.5 * (plan.high - plan.low)) + misfit
     left = x1 + middle * p1 - half * abs(p1 - lean) - misfit * abs(p1) - np.float32(plan.reach)
     right = x2 + middle * p2 + half * abs(p2 - lean) + misfit * abs(p2)
+    if not left <= right:  # too large for float32
+        left, right = -FAR, FAR
     first = bucket_at(left - np.float32(2.0), plan, place.first, buckets)
     last = bucket_at(right + ONE, plan, place.first, buckets)
     return np.int64(starts[first]), np.int64(starts[last + 1])

@@ -203,7 +203,7 @@ def is_hidden(place, nearest, record, lens, rows, scratch):
 @inlined
 def drop_hidden(views, nearest, ints, planes):
     """Leave out the views in which nothing as near as `nearest` is seen; returns whether there are others."""
-    for v in range(whole_steps(views)):
+    for v in range(views):  # lanes beyond have no place in the planes
         farthest = planes[FARTHEST + np.uint64(ints[BASE + v] >> np.int32(CELL))]
         hidden = (nearest > farthest) & (ints[COUNT + v] <= np.int32(8))
         ints[COUNT + v] = np.int32(0) if hidden else ints[COUNT + v]

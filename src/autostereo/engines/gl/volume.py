@@ -45,7 +45,7 @@ from .volume_space import most_half_spaces, pixel_in, placing
 
 TOGETHER = 4  # volumes that compose in one march: each takes three of the 16 texture units that there are at least
 NEAR, NEAR_UNLIT = 0.75, 0.25  # voxels that a shared lookup may be beside a ray,
-PIXELS = 2.0  # and pixels, for where voxels are large
+PIXELS = 2.0  # and pixels in the middle of the volumes, for where voxels are large
 FEW_COLUMNS, MOST_COLUMNS = 4, 16  # of a table that is sorted: a ray a fragment, three rays
 LENGTHS = 8  # lengths of slabs per doubling, for which tables are made
 SHADERS = {
