@@ -24,7 +24,7 @@ VIEWS_AT_ONCE = 256
 SMALL_MADE, COLORS_MADE = 1, 2
 PLANE = np.uint64(16384 + 5 * 16)  # samples of a block; planes must not fall onto the same cache sets
 NEAREST, STOP, WEIGHT, SUM_R, SUM_G, SUM_B, FARTHEST = (PLANE * np.uint64(k) for k in range(7))
-PLANES = 7
+PLANES = 7 + 4  # in the last four, lanes beyond the last view look for farthest depths
 CELL = 2  # there is a farthest depth for every 2² samples: of them …
 CELL_REACH = 12  # … and of those after them
 COARSE = FARTHEST + PLANE // np.uint64(2)  # and one for every 2³ samples of 2³ views
@@ -203,7 +203,7 @@ def is_hidden(place, nearest, record, lens, rows, scratch):
 @inlined
 def drop_hidden(views, nearest, ints, planes):
     """Leave out the views in which nothing as near as `nearest` is seen; returns whether there are others."""
-    for v in range(views):  # lanes beyond have no place in the planes
+    for v in range(whole_steps(views)):
         farthest = planes[FARTHEST + np.uint64(ints[BASE + v] >> np.int32(CELL))]
         hidden = (nearest > farthest) & (ints[COUNT + v] <= np.int32(8))
         ints[COUNT + v] = np.int32(0) if hidden else ints[COUNT + v]
