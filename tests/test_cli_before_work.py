@@ -123,3 +123,5 @@ def test_animations_have_room_beside_their_views(cli: Run, folder: Path, monkeyp
 def test_numbers_that_python_does_not_read_are_none(cli: Run, folder: Path) -> None:
     size = "1" * 5000 + "x9"
     refused(cli("render", "square.off", "-d", "lenticular-8", "--size", size), "--size: expected two whole")
+    refused(cli("info", "square.off", "--shape", size + "x9"), "--shape: expected three whole")
+    refused(cli("simulate", "level", "-n", "1" * 5000), "--views: expected numbers from 1 to 256")

@@ -101,13 +101,19 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", callback=_set_quiet, help=
 
 
 # --- reading of values ---------------------------------------------------------------------------------------------
+def whole_number(text: str) -> int | None:
+    """The whole number ≥ 0 that a text is, or None; no more than 99 digits are read (Python itself stops at 4300)."""
+    text = text.strip()
+    return int(text) if text.isascii() and text.isdigit() and len(text) < 100 else None
+
+
 def parse_pair(text: str, name: str, high: int, picture: bool = False) -> tuple[int, int]:
     """Read "AxB" as two whole numbers in 1…high; of a `picture` that is too large an error says what it would take."""
     parts = text.lower().replace("×", "x").split("x")
-    whole = [part.strip() for part in parts if part.strip().isascii() and part.strip().isdigit()]
-    if len(parts) != 2 or len(whole) != 2 or max(map(len, whole)) > 99:  # Python reads no more than 4300 digits
+    counts = [count for part in parts if (count := whole_number(part)) is not None]
+    if not len(parts) == len(counts) == 2:
         raise InputError(f"{name}: expected two whole numbers such as 420x560, got {text[:60]!r}")
-    first, second = (int(part) for part in parts)
+    first, second = counts
     if not (1 <= first <= high and 1 <= second <= high):
         from ..memory import gigabytes
 
@@ -284,10 +290,10 @@ class VolumeOptions:
         """What `load` wants to know."""
         result: dict[str, Any] = {"dtype": self.dtype, "frame": self.frame}
         if self.shape is not None:
-            parts = self.shape.lower().replace("×", "x").split("x")
-            if len(parts) != 3 or not all(part.isascii() and part.isdigit() for part in parts):
-                raise InputError(f"--shape: expected three whole numbers such as 256x256x128, got {self.shape!r}")
-            result["shape"] = tuple(int(part) for part in parts)
+            counts = [whole_number(part) for part in self.shape.lower().replace("×", "x").split("x")]
+            if len(counts) != 3 or None in counts:
+                raise InputError(f"--shape: expected three whole numbers such as 256x256x128, got {self.shape[:60]!r}")
+            result["shape"] = tuple(counts)
         if self.spacing is not None:
             result["spacing"] = parse_numbers(self.spacing, "--spacing", 3)
         return result

@@ -115,10 +115,9 @@ def simulate(
 
 
 def _counts(text: str) -> list[int]:
-    parts = [part.strip() for part in text.split(",")]
-    if not all(part.isascii() and part.isdigit() and 1 <= int(part) <= MAX_VIEWS for part in parts):
-        raise InputError(f"--views: expected numbers from 1 to {MAX_VIEWS} separated by commas, got {text!r}")
-    counts = sorted(int(part) for part in parts)
+    counts = sorted(common.whole_number(part) or 0 for part in text.split(","))
+    if not 1 <= counts[0] <= counts[-1] <= MAX_VIEWS:
+        raise InputError(f"--views: expected numbers from 1 to {MAX_VIEWS} separated by commas, got {text[:60]!r}")
     if len(set(counts)) < len(counts):
         raise InputError(f"--views: expected each number once, got {text!r}")
     return counts

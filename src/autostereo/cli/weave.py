@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..errors import FileError, InputError
+from ..errors import InputError
 from ..wording import an, counted
 from . import common, outputs
 from .common import note, say
@@ -38,12 +38,10 @@ def weave(
       autostereo weave picture.png --grid 5x9 -d visual.json --filter linear -o panel.png
     """
     from ..encoders.quilt import parse_quilt_name
+    from ..io.files import check_start
 
     named = parse_quilt_name(quilt)
-    if not quilt.exists():
-        raise FileError(f"{quilt}: no such file")
-    if quilt.is_dir():
-        raise FileError(f"{quilt}: is a folder, not a file")
+    check_start(quilt)
     if grid is not None:
         columns, rows = common.parse_pair(grid, "--grid", 1024)
     elif named is not None:

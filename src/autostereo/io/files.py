@@ -55,7 +55,7 @@ def read_bytes(path: PathLike, asked_by: PathLike | None = None, limit: int = -1
         raise FileError(f"{name} {what}" if asked_by else f"{path}: {what}") from None
     if not data:
         raise FileError(f"{name} is empty" if asked_by else f"{path}: the file is empty")
-    start = data[:256].lstrip(b"\xef\xbb\xbf \t\r\n").lower()
+    start = data[:256].lstrip(BYTE_ORDER_MARK + b" \t\r\n").lower()
     if start.startswith((b"<!doctype html", b"<html")):
         raise FileError(f"{path}: is a web page (HTML), not the file itself; download it again")
     if start.startswith(b"version https://git-lfs"):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..errors import FileError
 from ..scene.mesh import Mesh, merge_positions
 from ..scene.points import Points
-from .files import PathLike, numbers, read_bytes, read_text, whole_numbers
+from .files import BYTE_ORDER_MARK, PathLike, numbers, read_bytes, read_text, whole_numbers
 from .image import read_image
 from .ply import Ply, Ragged, read_ply
 from .points import points_of_columns
@@ -127,7 +127,7 @@ def load_stl(path: PathLike) -> list[Mesh]:
     """Read an STL mesh, binary or ASCII. Equal positions become one vertex; facet normals follow from the winding."""
     data = read_bytes(path)
     count = int.from_bytes(data[80:84], "little") if len(data) >= 84 else -1
-    if re.match(rb"(\xef\xbb\xbf)?\s*solid\b", data, re.IGNORECASE) and len(data) != 84 + 50 * count:
+    if re.match(rb"(%b)?\s*solid\b" % BYTE_ORDER_MARK, data, re.IGNORECASE) and len(data) != 84 + 50 * count:
         corners = _stl_text(data, path)
     elif count < 0 or len(data) < 84 + 50 * count:
         raise FileError(
