@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import functools
 import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +14,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from autostereo.engines.cpu import simd
 from autostereo.engines.cpu.jit import kernel
 from autostereo.engines.cpu.simd import (
     LANES,
@@ -20,7 +22,7 @@ from autostereo.engines.cpu.simd import (
     bits,
     ceil,
     even_lanes,
-    first_fours,
+    first_in_turn,
     floor,
     from_bits,
     fused,
@@ -28,16 +30,20 @@ from autostereo.engines.cpu.simd import (
     greater,
     high_halves,
     high_pairs,
+    inverse_sqrt,
     iota,
     keep_greater,
     lane,
-    last_fours,
+    last_in_turn,
     lesser,
     load,
+    load_eight,
     low_halves,
     low_pairs,
     mask_word,
+    pack_bytes,
     prefetch,
+    reciprocal,
     select,
     splat,
     sqrt,
@@ -64,7 +70,7 @@ def arithmetic(a, out):
         x + y, x - y, x * y, x / y, x * np.float32(3.0), np.float32(2.0) - y, lesser(x, y), greater(x, y),
         floor(x), ceil(y), sqrt(greater(x, np.float32(0.0))), select(x < y, x, y), select(x >= y, x, np.float32(7.0)),
         from_bits(bits(x)), to_float(to_int(x)), splat(a[3]), gather(a, iota() + np.int32(5)),
-        low_halves(x, y), high_halves(x, y), low_pairs(x, y), high_pairs(x, y), first_fours(x, y), last_fours(x, y),
+        low_halves(x, y), high_halves(x, y), low_pairs(x, y), high_pairs(x, y), first_in_turn(x, y), last_in_turn(x, y),
         even_lanes(x, y), lesser(greater(x, np.float32(-1.0)), np.float32(1.0)),
     )  # fmt: skip
     for k in range(len(results)):
@@ -122,11 +128,37 @@ def neighbours(a, out):
 
 
 def product_and_sum(a, b, c, out):
-    """fused of eight lanes."""
+    """fused of vectors, and with a scalar."""
     store(out, 0, fused(load(a, 0), load(b, 0), load(c, 0)))
+    store(out, LANES, fused(load(a, 0), b[1], load(c, 0)))
 
 
-KERNELS = (arithmetic, doubles_of, whole_numbers, kept, listed, streamed, neighbours, product_and_sum)
+def one_through(a, out):
+    """reciprocal of all lanes."""
+    store(out, 0, reciprocal(load(a, 0)))
+
+
+def one_through_root(a, out):
+    """inverse_sqrt of all lanes."""
+    store(out, 0, inverse_sqrt(load(a, 0)))
+
+
+def packed(r, g, b, out):
+    """pack_bytes of all lanes."""
+    store(out, 0, pack_bytes(load(r, 0), load(g, 0), load(b, 0)))
+
+
+def of_eight(a, out):
+    """Arithmetic of eight lanes, whatever others have, and with scalars."""
+    x, y = load_eight(a, 0), load_eight(a, 8)
+    store(out, 0, (x + y) * x - y)
+    store(out, 8, (x - a[3]) * np.float32(0.5) + y)
+
+
+KERNELS = (
+    arithmetic, doubles_of, whole_numbers, kept, listed, streamed, neighbours, product_and_sum, one_through,
+    one_through_root, packed, of_eight,
+)  # fmt: skip
 COMPILED = {f.__name__: kernel(f) for f in KERNELS}
 
 
@@ -200,6 +232,20 @@ def generic_listed():
     return compiled
 
 
+@functools.cache
+def generic_packed():
+    """`packed` compiled as for a processor without AVX2."""
+    from numba import njit
+
+    from autostereo.engines.cpu import simd_compiled
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(simd_compiled, "_has_avx2", lambda: False)
+        compiled = njit(packed)
+        compiled(*np.zeros((4, LANES), np.int32))
+    return compiled
+
+
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.uint32, np.float32])
 def test_adjacent(kind: type) -> None:
     bytes_of = np.random.default_rng(5).integers(0, 256, 20 * np.dtype(kind).itemsize, dtype=np.uint8)
@@ -214,8 +260,9 @@ def test_adjacent(kind: type) -> None:
 @given(floats, floats)
 @settings(deadline=None, max_examples=60)
 def test_fused_is_rounded_once_or_twice(a: np.ndarray, b: np.ndarray) -> None:
-    x, y, z, out = a[:LANES], a[LANES:], b[:LANES], np.zeros(LANES, np.float32)
-    COMPILED["product_and_sum"](x, y, z, out)
+    x, y, z, out = a[:LANES], a[LANES:], b[:LANES], np.zeros((2, LANES), np.float32)
+    COMPILED["product_and_sum"](x, y, z, out.ravel())
+    y = np.stack([y, np.full(LANES, y[1])])
     once = (x.astype(np.float64) * y + z).astype(np.float32)  # the product is exact, the sum rounded to 53 bits
     twice = x * y + z
     near = np.abs(out - once) <= np.spacing(np.abs(once))
@@ -234,7 +281,67 @@ def test_vectors_survive_a_cache() -> None:
     """Kinds are pickled by name, so that kernels loaded from a cache know them."""
     import pickle
 
-    from autostereo.engines.cpu.simd_compiled import F32, F64, I32, MASK
+    from autostereo.engines.cpu.simd_types import EIGHT, F32, F64, I32, MASK
 
-    assert all(pickle.loads(pickle.dumps(kind)) is kind for kind in (F32, F64, I32, MASK))
-    assert simd.LANES == 8
+    assert all(pickle.loads(pickle.dumps(kind)) is kind for kind in (F32, F64, I32, MASK, EIGHT))
+
+
+@given(arrays(np.float32, LANES, elements=st.floats(2.0**-100, 2.0**100, width=32)), st.sampled_from([-1.0, 1.0]))
+@settings(deadline=None, max_examples=60)
+def test_reciprocal(a: np.ndarray, sign: float) -> None:
+    """Within two units in the last place."""
+    out = np.zeros(LANES, np.float32)
+    COMPILED["one_through"](a * np.float32(sign), out)
+    right = sign / a.astype(np.float64)
+    assert (np.abs(out - right) <= 2 * np.spacing(np.abs(right).astype(np.float32))).all()
+    COMPILED["one_through_root"](a, out)
+    right = 1.0 / np.sqrt(a.astype(np.float64))
+    assert (np.abs(out - right) <= 2 * np.spacing(right.astype(np.float32))).all()
+
+
+wide_ints = arrays(np.int32, LANES, elements=st.integers(-(2**31), 2**31 - 1))
+
+
+@pytest.mark.parametrize("generic", [False, True])
+@given(wide_ints, ints, wide_ints)
+@settings(deadline=None, max_examples=60)
+def test_pack_bytes(generic: bool, r: np.ndarray, g: np.ndarray, b: np.ndarray) -> None:
+    """By AVX2's or AVX-512's saturation, and by comparisons."""
+    run = generic_packed() if generic else COMPILED["packed"]
+    out, wanted = np.zeros((2, LANES), np.int32)
+    run(r, g, b, out)
+    packed(r, g, b, wanted)
+    np.testing.assert_array_equal(out, wanted)
+    of_bytes = out.view(np.uint8).reshape(LANES, 4)
+    np.testing.assert_array_equal(of_bytes[:, 0], np.clip(r, 0, 255))
+    np.testing.assert_array_equal(of_bytes[:, 3], 255)
+
+
+@given(arrays(np.float32, 16, elements=st.floats(-1e6, 1e6, width=32)))
+@settings(deadline=None, max_examples=60)
+def test_eight_lanes(a: np.ndarray) -> None:
+    out, wanted = np.zeros((2, 16), np.float32)
+    COMPILED["of_eight"](a, out)
+    of_eight(a, wanted)
+    same(out, wanted)
+
+
+def test_as_many_lanes_as_the_processor_has() -> None:
+    from llvmlite import binding
+
+    wide = binding.get_host_cpu_features().get("avx512f", False)
+    assert LANES == (16 if wide else 8)
+
+
+@pytest.mark.skipif(LANES == 8, reason="this processor has no AVX-512: eight lanes are what all tests run with")
+def test_eight_lanes_where_there_is_no_avx512() -> None:
+    """These tests, and views and panels against the reference, as on a processor without AVX-512."""
+    here = Path(__file__).parent
+    files = here / "test_simd.py", here / "agreement" / "test_mesh_agreement.py"
+    plugins = "-p", "without_avx512", "-p", "no:cacheprovider"
+    run = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", *plugins, "-k", "simd or of_the_reference", *files],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(here), *sys.path])},
+        capture_output=True, text=True, check=False, cwd=here.parent,
+    )  # fmt: skip
+    assert run.returncode == 0, run.stdout[-4000:]

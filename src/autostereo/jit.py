@@ -89,10 +89,16 @@ class Kernels:
 
 
 def _key(folder: Path) -> str:
-    """Digest of the folder's sources, where they lie (Numba's cache asks), Numba's version and Python's."""
-    import numba
+    """Digest of the folder's sources, where they lie (Numba's cache asks), the versions, and the processor.
 
-    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:3]} {folder}".encode())
+    The processor, because kernels for another have other vectors, which this one's could not even read.
+    """
+    import numba
+    from llvmlite import binding
+
+    processor = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+    chosen = numba.config.CPU_NAME, numba.config.CPU_FEATURES
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:3]} {folder} {processor} {chosen}".encode())
     for source in sorted(folder.glob("*.py")):
         digest.update(source.read_bytes())
     return digest.hexdigest()[:16]

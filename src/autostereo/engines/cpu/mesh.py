@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from ...scene.mesh import Mesh
 from ...scene.scene import Scene
 from ..engine import Draw, Target
+from . import mesh_panel, mesh_views
 from .memory import Memory
-from .mesh_panel import Panel, draw_panel
+from .mesh_panel import Panel
 from .mesh_raster import Scratch, Shader, Surface
 from .mesh_reuse import exact_offsets
 from .mesh_setup import (
@@ -28,7 +29,7 @@ from .mesh_setup import (
     project_vertices,
     turn_normals,
 )
-from .mesh_views import draw_views
+from .mesh_shade import ANY, DIFFUSE, PLAIN
 from .panel_lines import LinePlan, line_buckets, line_capacity, plan_lines
 from .panel_list import STRIDE, Block
 from .scene_arrays import SceneArrays, background_word, light_array, scene_arrays
@@ -36,7 +37,7 @@ from .simd import LANES
 from .threads import run_rows
 
 BAND_BYTES = 320_000  # of the samples of a row of all views: with what else a row touches they stay in L2
-PANEL_COLUMNS = 2048  # most pixels of a panel's block
+PANEL_COLUMNS = 8192  # most pixels of a panel's block
 VERTEX_CHUNK = 4096
 CHUNKS = 4  # of triangles that a thread sorts into bins
 _counting = threading.Lock()
@@ -75,16 +76,20 @@ def draw_mesh_views(prepared: PreparedMeshes, draw: Draw, target: Target, memory
     samples = views * block + block + LANES  # a run of one view may lead on where another's has ended
     sums = 4 * samples if side > 1 else 0
     exact = (len(shader.exact), width)
-    pool = memory.pool(("views", samples, sums, exact), lambda: new_scratch(samples, sums, exact))
     offsets = np.pad(draw.offsets.astype(np.float32), (0, LANES - 1), mode="edge")
+    pool = memory.pool(
+        ("views", samples, sums, exact, offsets.shape),
+        lambda: (new_scratch(samples, sums, exact), np.zeros(offsets.shape, np.int32)),
+    )
+    kernel = mesh_views.KERNELS[only_kind(surface, shader)]
     background = background_word(prepared.scene)
     out = target.color.view(np.int32).reshape(views, height, width)
     depth = np.empty((0, 0, 0), np.float32) if target.depth is None else target.depth
 
     def task(first: int, end: int) -> None:
-        with pool as scratch:
-            bins = (first, end, blocks, block)
-            draw_views(bins, surface, camera, shader, offsets, background, side, scratch, out, depth)
+        with pool as (scratch, places):
+            job = (surface, camera, shader, offsets, places, background, side)
+            kernel((first, end, blocks, block), job, scratch, out, depth)
             count_samples(target, scratch)
 
     run_rows(height * blocks, task)
@@ -108,14 +113,22 @@ def draw_mesh_panel(prepared: PreparedMeshes, draw: Draw, target: Target, memory
     )
     background = background_word(prepared.scene)
     depth = np.empty((0, 0, 0), np.float32) if target.depth is None else target.depth
+    kernel = mesh_panel.KERNELS[only_kind(surface, shader)]
 
     def task(first: int, end: int) -> None:
         with pool as (block, scratch):
-            bins = (first, end, blocks, columns)
-            draw_panel(bins, surface, camera, shader, panel, block, background, side, scratch, target.color, depth)
+            job = (surface, camera, shader, panel, background, side)
+            kernel((first, end, blocks, columns), job, (block, scratch), target.color, depth)
             count_samples(target, scratch)
 
     run_rows(height * blocks, task)
+
+
+def only_kind(surface: Surface, shader: Shader) -> int:
+    """What shades every triangle: PLAIN or DIFFUSE where that holds for all, else ANY."""
+    if not surface.materials[:, 6].all():
+        return ANY
+    return PLAIN if not shader.per_sample else DIFFUSE if shader.diffuse else ANY
 
 
 def new_scratch(samples: int, sums: int, exact: tuple[int, int]) -> Scratch:
@@ -124,7 +137,7 @@ def new_scratch(samples: int, sums: int, exact: tuple[int, int]) -> Scratch:
     return Scratch(
         band,
         band.view(np.int32),
-        np.zeros(2 * LANES, np.float32),
+        np.zeros(16, np.float32),
         np.zeros(STRIDE, np.int32),
         words,
         words.view(np.int32),
@@ -157,7 +170,7 @@ def new_block(rows: int, columns: int, plan: LinePlan) -> Block:
         np.zeros((rows, capacity), np.int32),
         np.zeros((rows, line_buckets(plan, columns) + 1), np.int32),
         np.zeros((3, capacity), np.float32),
-        np.zeros(capacity, np.int32),
+        np.zeros((2, capacity), np.int32),
         np.zeros(columns, np.float64),
     )
 
@@ -188,7 +201,7 @@ def surface_at(
     two_sided = bool(arrays.materials[:, 4].any())
     vertices = memory.buffer("vertices", (count, 3), np.float64)
     sides = 2 if two_sided and not per_sample else 1
-    attributes = memory.buffer("attributes", (count, LANES * sides), np.float32)
+    attributes = memory.buffer("attributes", (count, 8 * sides), np.float32)
 
     behind: list[int] = []
 

@@ -1,6 +1,6 @@
 """The triangles that meet one row of a block: what every draw of meshes does before it comes to samples.
 
-Technique: edges are cut for eight triangles at a time (SIMD over triangles), then segments are drawn one by one.
+Technique: edges are cut for LANES triangles at a time (SIMD over triangles), then segments are drawn one by one.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def fetch_ahead(surface, entry, end):
         for c in range(np.uint64(3)):
             corner = np.uint64(surface.triangles[index + c])
             prefetch(surface.vertices, corner * np.uint64(3))
-            prefetch(surface.attributes, corner * np.uint64(LANES * surface.sides))
+            prefetch(surface.attributes, corner * np.uint64(8 * surface.sides))
 
 
 @inlined
@@ -50,12 +50,32 @@ def end_of(k, j, setup, ends):
 
 
 @inlined
-def draw_row(draw_segment, place, span, row, bin_index, surface, camera, shader, sample, scratch):
+def only_plain(materials, m, shader):
+    """What shades material m where all are PLAIN: known when kernels are compiled, so the rest is left out of them."""
+    return PLAIN
+
+
+@inlined
+def only_diffuse(materials, m, shader):
+    """What shades material m where all are DIFFUSE."""
+    return DIFFUSE
+
+
+@inlined
+def any_kind(materials, m, shader):
+    """What shades material m: PLAIN, DIFFUSE or ANY."""
+    if materials[m, 6] == ZERO:
+        return ANY
+    return PLAIN if not shader.per_sample else DIFFUSE if shader.diffuse else ANY
+
+
+@inlined
+def draw_row(draw_segment, kind_of, place, span, row, bin_index, surface, camera, shader, sample, scratch):
     """Call draw_segment(place, ends, depths, kind, shader, shading, scratch) for every segment of a bin.
 
-    span: least and greatest offset drawn; row: its number in the picture; sample = (x, y) of the sample in its pixel;
-    ends, depths: see samples.hit; kind: PLAIN, DIFFUSE or ANY; shading: see mesh_shade.shade; attributes are in
-    scratch.segment.
+    kind_of: only_plain, only_diffuse or any_kind; span: least and greatest offset drawn; row: its number in the
+    picture; sample = (x, y) of the sample in its pixel; ends, depths: see samples.hit; kind: PLAIN, DIFFUSE or ANY;
+    shading: see mesh_shade.shade; attributes are in scratch.segment.
     """
     attributes, uv, lit, triangles = surface.attributes, surface.uv, surface.sides, surface.triangles
     materials, segment = surface.materials, scratch.segment
@@ -76,9 +96,8 @@ def draw_row(draw_segment, place, span, row, bin_index, surface, camera, shader,
             m = np.uint64(triangles[first + np.uint64(3)] >> 1)
             sides = 2 if materials[m, 4] != ZERO else 1
             material = (materials[m, 0], materials[m, 1], materials[m, 2], materials[m, 3], materials[m, 5])
-            textured, kind = materials[m, 5] >= ZERO, ANY
-            if materials[m, 6] != ZERO:
-                kind = PLAIN if not shader.per_sample else DIFFUSE if shader.diffuse else ANY
+            kind = kind_of(materials, m, shader)
+            textured = kind == ANY and materials[m, 5] >= ZERO
             if kind == ANY:
                 row_geometry(row + sample_y, camera, detail)
             corners = (

@@ -1,4 +1,4 @@
-"""Light on eight samples of a surface at a time (SIMD over samples)."""
+"""Light on LANES samples of a surface at a time (SIMD over samples)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,20 @@ import numpy as np
 
 from .jit import inlined
 from .scalars import ONE, TINY, ZERO
-from .simd import bits, floor, from_bits, greater, lesser, select, sqrt, to_float, to_int
+from .simd import (
+    bits,
+    floor,
+    from_bits,
+    fused,
+    greater,
+    inverse_sqrt,
+    lesser,
+    reciprocal,
+    select,
+    splat,
+    to_float,
+    to_int,
+)
 
 LIGHT_POINT = ONE
 
@@ -17,12 +30,12 @@ def log2_lanes(x):
     word = bits(x)
     exponent = (word - np.int32(0x3F3504F3)) >> np.int32(23)
     m = from_bits(word - (exponent << np.int32(23)))
-    s = (m - ONE) / (m + ONE)
+    s = (m - ONE) * reciprocal(m + ONE)
     q = s * s
-    series = q * (q * (q * (q * np.float32(0.3205989) + np.float32(0.4121986)) + np.float32(0.5770780)) + np.float32(
-        0.9617967
-    )) + np.float32(2.8853901)
-    return to_float(exponent) + s * series
+    series = fused(q, np.float32(0.3205989), splat(np.float32(0.4121986)))
+    for factor in (0.5770780, 0.9617967, 2.8853901):
+        series = fused(q, series, splat(np.float32(factor)))
+    return fused(s, series, to_float(exponent))
 
 
 @inlined
@@ -31,9 +44,9 @@ def exp2_lanes(x):
     x = greater(x, np.float32(-120.0))
     whole = floor(x)
     f = x - whole
-    p = f * np.float32(0.000216138082) + np.float32(0.00124673764)
-    p = f * (f * p + np.float32(0.00967553263)) + np.float32(0.0554852202)
-    p = f * (f * (f * p + np.float32(0.240229325)) + np.float32(0.693147042)) + ONE
+    p = fused(f, np.float32(0.000216138082), splat(np.float32(0.00124673764)))
+    for factor in (0.00967553263, 0.0554852202, 0.240229325, 0.693147042, 1.0):
+        p = fused(f, p, splat(np.float32(factor)))
     return from_bits((to_int(whole) + np.int32(127)) << np.int32(23)) * p
 
 
@@ -49,30 +62,34 @@ def locate(x, z, offset, row):
 
 
 @inlined
+def dot(a, b):
+    """Scalar product; components of `b` may be scalars."""
+    return fused(a[0], b[0], fused(a[1], b[1], a[2] * b[2]))
+
+
+@inlined
 def unit(x, y, z):
     """A vector of length 1."""
-    scale = ONE / sqrt(greater(x * x + y * y + z * z, TINY))
+    scale = inverse_sqrt(greater(dot((x, y, z), (x, y, z)), TINY))
     return x * scale, y * scale, z * scale
 
 
 @inlined
 def diffuse_light(normal, lights, k):
     """Directional light k on a surface."""
-    x, y, z = normal
-    nl = greater(x * lights[k, 1] + y * lights[k, 2] + z * lights[k, 3], ZERO)
+    nl = greater(dot(normal, (lights[k, 1], lights[k, 2], lights[k, 3])), ZERO)
     return nl * lights[k, 4], nl * lights[k, 5], nl * lights[k, 6]
 
 
 @inlined
 def full_light(normal, place, eye, lights, k, shininess):
     """Diffuse and specular light k, a directional or a point light, on a surface at `place` seen from (eye x, y)."""
-    (nx, ny, nz), (px, py, pz) = normal, place
+    px, py, pz = place
     p = ONE if lights[k, 0] == LIGHT_POINT else ZERO
     lx, ly, lz = unit(px * -p + lights[k, 1], py * -p + lights[k, 2], pz * -p + lights[k, 3])
-    nl = greater(nx * lx + ny * ly + nz * lz, ZERO)
+    nl = greater(dot(normal, (lx, ly, lz)), ZERO)
     vx, vy, vz = unit(eye[0] - px, eye[1] - py, pz)
-    hx, hy, hz = unit(lx + vx, ly + vy, lz - vz)
-    nh = greater(nx * hx + ny * hy + nz * hz, TINY)
+    nh = greater(dot(normal, unit(lx + vx, ly + vy, lz - vz)), TINY)
     shine = exp2_lanes(log2_lanes(lesser(nh, ONE)) * shininess)
     shine = select(nl > ZERO, shine, ZERO)
     r, g, b = lights[k, 4], lights[k, 5], lights[k, 6]

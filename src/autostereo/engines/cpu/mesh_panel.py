@@ -1,7 +1,7 @@
 """Meshes straight to an interlaced panel: every sub-pixel its own camera offset, no stack of views in between.
 
 For each segment (mesh_raster) the samples that it may cover are listed (panel_list); coverage, depth and colour at
-their exact offsets are those of every other draw, eight samples at a time (SIMD over samples), and one scalar pass
+their exact offsets are those of every other draw, LANES samples at a time (SIMD over samples), and one scalar pass
 keeps what is nearer.
 """
 
@@ -12,14 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_block import draw_row
+from .mesh_block import any_kind, draw_row, only_diffuse, only_plain
 from .mesh_reuse import shade_exact, shade_or_reuse
-from .mesh_shade import PLAIN, to_levels
+from .mesh_shade import ANY, DIFFUSE, PLAIN, to_levels
 from .panel_lines import LinePlan, make_lines, row_offsets
 from .panel_list import ADDRESS, Block, draw_stretch, samples_at
-from .samples import clear_samples, depth_bits, hit, keep_nearer, store_words
+from .samples import WORD, clear_samples, depth_bits, hit, keep_nearer, store_words
 from .scalars import BYTE, ZERO
-from .simd import LANES, gather, greater, lesser, load, mask_word, select, splat, to_int
+from .simd import LANES, fused, gather, greater, lesser, load, mask_word, select, splat, to_int
 
 
 class Panel(NamedTuple):
@@ -51,7 +51,7 @@ def channel_color(u, green, blue, segment):
     """Interpolated colour of each sample's own channel of a segment of levels, as RGBA bytes."""
     start = select(blue, segment[2], select(green, segment[1], splat(segment[0])))
     step = select(blue, segment[10], select(green, segment[9], splat(segment[8])))
-    value = to_int(lesser(greater(u * step + start, ZERO), BYTE))
+    value = to_int(lesser(greater(fused(u, step, start), ZERO), BYTE))
     return select(blue, value << np.int32(16), select(green, value << np.int32(8), value))
 
 
@@ -76,7 +76,7 @@ def draw_listed(n, place, row, ends, what, scratch):
             color = shade_or_reuse(kind, reuse, seen, (x, z, offset), u, place.at[3], shader, shading, scratch)
         store_words(depth, color, word_halves)
         for j in range(LANES):
-            keep_nearer(np.uint64(ints[ADDRESS + np.uint64(i + j)]), words[j], band)
+            keep_nearer(np.uint64(ints[ADDRESS + np.uint64(i + j)]), words[WORD[j]], band)
 
 
 @inlined
@@ -163,12 +163,11 @@ def store_depth(row, columns, drawn, base, plane, focal, flip, band, depth):
                 depth[row, column, c] = np.float32(np.inf)
 
 
-@kernel
-def draw_panel(bins, surface, camera, shader, panel, block, background, side, scratch, out, depth):
-    """Draw bins (first, end, blocks a row, columns per block) into out (H, W, 3) uint8.
-
-    side² samples a sub-pixel; depth (H, W, 3) float32 of the first, or of no size when it is not wanted.
-    """
+@inlined
+def draw_bins(kind_of, bins, job, memory, out, depth):
+    """Draw bins (first, end, blocks a row, columns per block); see draw_panel."""
+    surface, camera, shader, panel, background, side = job
+    block, scratch = memory
     height, width, _ = out.shape
     flat, plan, plane = out.reshape(-1), panel.plan, bins[3]
     step, span = -3 if panel.flip_x else 3, (np.float32(plan.low), np.float32(plan.high))
@@ -195,7 +194,7 @@ def draw_panel(bins, surface, camera, shader, panel, block, background, side, sc
             place = Place(block, plan, first, plane, at, np.float32(width))
             for c in range(3):
                 clear_samples(base + c * plane, count, background, scratch.halves)
-            draw_row(draw_segment, place, span, r, k, surface, camera, shader, (x, y), scratch)
+            draw_row(draw_segment, kind_of, place, span, r, k, surface, camera, shader, (x, y), scratch)
             if side > 1:
                 add_samples(count, base, plane, scratch.band, scratch.sums)
         if side > 1:
@@ -207,3 +206,28 @@ def draw_panel(bins, surface, camera, shader, panel, block, background, side, sc
         store_background(begin + step * columns[0], step, drawn[0] - columns[0], background, flat)
         store_row(begin + step * drawn[0], step, base, count, plane, scratch.band, flat)
         store_background(begin + step * drawn[1], step, columns[1] - drawn[1], background, flat)
+
+
+@kernel
+def draw_panel(bins, job, memory, out, depth):
+    """Draw bins (first, end, blocks a row, columns per block) into out (H, W, 3) uint8.
+
+    job = (surface, camera, shader, panel, background, side), with side² samples a sub-pixel; memory = (block, scratch);
+    depth (H, W, 3) float32 of the first sample, or of no size when it is not wanted.
+    """
+    draw_bins(any_kind, bins, job, memory, out, depth)
+
+
+@kernel
+def draw_plain_panel(bins, job, memory, out, depth):
+    """draw_panel where all materials are PLAIN."""
+    draw_bins(only_plain, bins, job, memory, out, depth)
+
+
+@kernel
+def draw_diffuse_panel(bins, job, memory, out, depth):
+    """draw_panel where all materials are DIFFUSE."""
+    draw_bins(only_diffuse, bins, job, memory, out, depth)
+
+
+KERNELS = {PLAIN: draw_plain_panel, DIFFUSE: draw_diffuse_panel, ANY: draw_panel}

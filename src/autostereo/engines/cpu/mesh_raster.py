@@ -16,7 +16,7 @@ import numpy as np
 
 from .jit import inlined
 from .scalars import ZERO
-from .simd import LANES, gather, load, mask_word, select, splat, store, to_float
+from .simd import LANES, gather, load_eight, mask_word, select, splat, store, to_float
 
 X1, Z1, P1, U1, X2, Z2, P2, U2 = (np.uint64(LANES * k) for k in range(8))
 TEXTURE = 6  # attributes: the first lane of texture coordinates
@@ -47,9 +47,10 @@ class Scratch(NamedTuple):
     """One thread's own memory.
 
     band: samples, and the same as 32-bit halves; segment (16,) float32: attributes at the left end, then differences;
-    ints: addresses of samples at hand; words (16,), and as halves: samples at hand; lanes (24,) float32 and chosen
-    (8,) int32: of eight samples; detail (17,) float32: row_geometry, then uv_gradient; setup, ends: see cut_triangles;
-    sums of sub-samples; colours and spans of exact views, numbers of listed and reused samples (mesh_reuse).
+    ints: addresses of samples at hand; words (2·LANES,), and as halves: samples at hand; lanes (3·LANES,) float32 and
+    chosen (LANES,) int32: of samples; detail (17,) float32: row_geometry, then uv_gradient; setup, ends: see
+    cut_triangles; sums of sub-samples; colours and spans of exact views, numbers of listed and reused samples
+    (mesh_reuse).
     """
 
     band: np.ndarray
@@ -91,7 +92,7 @@ class Shader(NamedTuple):
 
 @inlined
 def cut_edge(top, bottom, y, scale):
-    """Where row y crosses eight edges: x at the centre, focal/depth, shift per unit of offset, perspective parameter.
+    """Where row y crosses LANES edges: x at the centre, focal/depth, shift per unit of offset, perspective parameter.
 
     top, bottom: (x, y, focal/depth) of the vertices, float64; scale = fx/focal. Always from the upper to the lower
     vertex, so that triangles sharing the edge cut it at the same bits.
@@ -107,7 +108,7 @@ def cut_edge(top, bottom, y, scale):
 
 @inlined
 def corner_of(vertices, corner):
-    """(x, y, focal/depth) of eight vertices; `vertices` is flat."""
+    """(x, y, focal/depth) of LANES vertices; `vertices` is flat."""
     first = corner * np.int32(3)
     return gather(vertices, first), gather(vertices, first + np.int32(1)), gather(vertices, first + np.int32(2))
 
@@ -120,11 +121,11 @@ def choose(mask, a, b):
 
 @inlined
 def cut_triangles(index, vertices, triangles, row, sample_y, scale, span, setup, ends):
-    """The segments of eight triangles in one row; returns the bits of those seen from the front, and from behind.
+    """The segments of LANES triangles in one row; returns the bits of those seen from the front, and from behind.
 
-    setup (64,) float32: X1, Z1, P1, U1 of the left ends, then of the right ends, in lanes (rows of 8); ends (32,)
-    int32: upper and lower vertex of the left, then of the right edge. A triangle that all offsets in `span` see from
-    the other side, or whose rows do not hold the sample, has no bit.
+    setup (8·LANES,) float32: X1, Z1, P1, U1 of the left ends, then of the right ends, in rows of LANES; ends
+    (4·LANES,) int32: upper and lower vertex of the left, then of the right edge. A triangle that all offsets in `span`
+    see from the other side, or whose rows do not hold the sample, has no bit.
     """
     first = index * np.int32(8)
     a, b, c = gather(triangles, first), gather(triangles, first + np.int32(1)), gather(triangles, first + np.int32(2))
@@ -159,13 +160,13 @@ def cut_triangles(index, vertices, triangles, row, sample_y, scale, span, setup,
 @inlined
 def fill_segment(attributes, sides, side, left, right, segment):
     """Attributes at the left end in segment[:8], the difference to the right in [8:]; left, right: (u, vertices)."""
-    step, first = np.uint64(LANES * sides), np.uint64(LANES * side)
-    start = load(attributes, left[1] * step + first)
-    start = start + (load(attributes, left[2] * step + first) - start) * left[0]
-    end = load(attributes, right[1] * step + first)
-    end = end + (load(attributes, right[2] * step + first) - end) * right[0]
+    step, first = np.uint64(8 * sides), np.uint64(8 * side)
+    start = load_eight(attributes, left[1] * step + first)
+    start = start + (load_eight(attributes, left[2] * step + first) - start) * left[0]
+    end = load_eight(attributes, right[1] * step + first)
+    end = end + (load_eight(attributes, right[2] * step + first) - end) * right[0]
     store(segment, 0, start)
-    store(segment, LANES, end - start)
+    store(segment, 8, end - start)
 
 
 @inlined
@@ -177,7 +178,7 @@ def fill_uv(uv, corners, left, right, segment):
         start = uv[a, k] - base + u * (uv[b, k] - uv[a, k])
         end = uv[c, k] - base + w * (uv[d, k] - uv[c, k])
         segment[TEXTURE + k] = np.float32(start)
-        segment[LANES + TEXTURE + k] = np.float32(end - start)
+        segment[8 + TEXTURE + k] = np.float32(end - start)
 
 
 @inlined

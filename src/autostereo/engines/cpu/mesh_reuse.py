@@ -62,7 +62,7 @@ def mix(a, b, part):
 
 @kernel
 def take_reused(seen, at, shader, lanes, chosen, colors, spans, counts):
-    """Give those of eight samples whose bit is seen remembered colours; returns the bits of those without one.
+    """Give those samples whose bit is seen remembered colours; returns the bits of those without one.
 
     lanes: x, 1/depth and offset of the samples.
     """
@@ -92,7 +92,7 @@ def take_reused(seen, at, shader, lanes, chosen, colors, spans, counts):
 
 @inlined
 def shade_or_reuse(kind, reuse, seen, sample, u, at, shader, shading, scratch):
-    """Colours of those of eight samples whose bit is seen: remembered where there are, else shaded."""
+    """Colours of those samples whose bit is seen: remembered where there are, else shaded."""
     if not reuse:
         if kind == DIFFUSE:
             return diffuse_color(u, shader, shading, scratch.segment)

@@ -1,4 +1,4 @@
-"""Shading of eight samples of one segment (one triangle in one row) at a time.
+"""Shading of LANES samples of one segment (one triangle in one row) at a time.
 
 Every colour is a direct function of (sample, camera offset): the same in single-pass, n-pass and panel draws.
 """
@@ -10,8 +10,8 @@ import numpy as np
 from .jit import inlined, kernel
 from .mesh_light import diffuse_light, full_light, locate, unit
 from .mesh_texture import level_of_detail, texture_colors
-from .scalars import ALPHA, BYTE, HALF, ONE, ZERO
-from .simd import LANES, greater, lesser, load, splat, store, to_int
+from .scalars import BYTE, HALF, ONE, ZERO
+from .simd import LANES, fused, lesser, load, load_eight, pack_bytes, splat, store, to_int
 
 PLAIN, DIFFUSE, ANY = 0, 1, 2  # colours only; normals and directional lights; whatever a material may have
 
@@ -19,39 +19,39 @@ PLAIN, DIFFUSE, ANY = 0, 1, 2  # colours only; normals and directional lights; w
 @inlined
 def attribute(segment, k, u):
     """Attribute k at perspective parameter u; a segment is 8 attributes at its left end, then 8 differences."""
-    return u * segment[np.uint64(k + 8)] + segment[np.uint64(k)]
+    return fused(u, segment[np.uint64(k + 8)], segment[np.uint64(k)])
 
 
 @inlined
 def to_byte(value):
-    """⌊255·v + ½⌋ of values clamped to 0…1."""
-    return to_int(lesser(greater(value, ZERO), ONE) * BYTE + HALF)
+    """⌊255·v + ½⌋ of values clamped to at most 1; of negative ones, something not above 0."""
+    return to_int(fused(lesser(value, ONE), BYTE, splat(HALF)))
 
 
 @inlined
 def pack(r, g, b):
     """RGBA bytes."""
-    return to_byte(r) | (to_byte(g) << np.int32(8)) | (to_byte(b) << np.int32(16)) | ALPHA
+    return pack_bytes(to_byte(r), to_byte(g), to_byte(b))
 
 
 @inlined
 def to_levels(segment):
     """Turn a segment's attributes into levels of 0…255, with ½ added, so that a sample need not."""
-    start, step = load(segment, 0), load(segment, LANES)
+    start, step = load_eight(segment, 0), load_eight(segment, 8)
     store(segment, 0, start * BYTE + HALF)
-    store(segment, LANES, step * BYTE)
+    store(segment, 8, step * BYTE)
 
 
 @inlined
 def level(segment, k, u):
-    """Attribute k of a segment of levels as bytes, clamped."""
-    return to_int(lesser(greater(attribute(segment, k, u), ZERO), BYTE))
+    """Attribute k of a segment of levels, clamped to at most 255."""
+    return to_int(lesser(attribute(segment, k, u), BYTE))
 
 
 @inlined
 def plain_color(u, segment):
     """Interpolated colour of a segment of levels as RGBA bytes."""
-    return level(segment, 0, u) | (level(segment, 1, u) << np.int32(8)) | (level(segment, 2, u) << np.int32(16)) | ALPHA
+    return pack_bytes(level(segment, 0, u), level(segment, 1, u), level(segment, 2, u))
 
 
 @inlined
@@ -86,7 +86,7 @@ def lit(sample, normal, shader, highlight, row):
 
 @kernel
 def shade(seen, sample, u, shader, shading, segment, lanes):
-    """Colours of eight samples as RGBA bytes, of those whose bit is seen.
+    """Colours of samples as RGBA bytes, of those whose bit is seen.
 
     sample = (x, focal/depth, offset); u: perspective parameter in the segment; shading = (material, side, detail);
     material = (ambient, diffuse, specular, shininess, texture); detail: row_geometry, then uv_gradient; lanes: scratch.
@@ -101,7 +101,7 @@ def shade(seen, sample, u, shader, shading, segment, lanes):
         lod = level_of_detail(offset, z, place, detail, size)
         top = shader.level_count[t] - 1
         texture_colors(seen, place, lod, shader.texels, levels[t], top, lanes)
-        r, g, b = r * load(lanes, 0), g * load(lanes, 8), b * load(lanes, 16)
+        r, g, b = r * load(lanes, 0), g * load(lanes, LANES), b * load(lanes, 2 * LANES)
     nx, ny, nz = attribute(segment, 3, u), attribute(segment, 4, u), attribute(segment, 5, u)
     if not shader.per_sample:
         return pack(r + nx, g + ny, b + nz)  # lit at the vertices: the other three are highlights

@@ -65,7 +65,7 @@ def bilinear(texels, first, width, height, s, t):
 
 @kernel
 def texture_color(s, t, lod, texels, levels, top, lanes, k):
-    """Trilinear colour of one sample into lanes[k], lanes[8 + k], lanes[16 + k].
+    """Trilinear colour of one sample into lanes[k], lanes[LANES + k], lanes[2·LANES + k].
 
     levels (L, 3): first texel, width, height; top: the last level.
     """
@@ -79,12 +79,12 @@ def texture_color(s, t, lod, texels, levels, top, lanes, k):
         r1, g1, b1 = bilinear(texels, levels[fine, 0], levels[fine, 1], levels[fine, 2], s, t)
         r, g, b = r + part * (r1 - r), g + part * (g1 - g), b + part * (b1 - b)
     k = np.uint64(k)
-    lanes[k], lanes[k + np.uint64(8)], lanes[k + np.uint64(16)] = r, g, b
+    lanes[k], lanes[k + np.uint64(LANES)], lanes[k + np.uint64(2 * LANES)] = r, g, b
 
 
 @inlined
 def texture_colors(seen, place, lod, texels, levels, top, lanes):
-    """Trilinear colours of eight samples at (s, t) into lanes[:24], red, green, blue; of those whose bit is seen."""
+    """Trilinear colours of samples at (s, t) into lanes[:3·LANES], red, green, blue; of those whose bit is seen."""
     s, t = place
     store(lanes, 0, s - floor(s))
     store(lanes, LANES, t - floor(t))

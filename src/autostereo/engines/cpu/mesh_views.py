@@ -1,6 +1,6 @@
 """Meshes to a stack of views: a row of a block of columns of every view at a time, in cache.
 
-For each triangle that meets the row, its segment (mesh_raster) is drawn into all views before the next, eight views at
+For each triangle that meets the row, its segment (mesh_raster) is drawn into all views before the next, LANES views at
 a time (SIMD over views): the pixels that it covers in each; then the first two covered samples of every view, the next
 two, and so on: depth and colour, and one pass over views that keeps what is nearer.
 """
@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from .jit import inlined, kernel
-from .mesh_block import draw_row
+from .mesh_block import any_kind, draw_row, only_diffuse, only_plain
 from .mesh_reuse import shade_exact, shade_or_reuse
-from .mesh_shade import PLAIN, plain_color, to_levels
+from .mesh_shade import ANY, DIFFUSE, PLAIN, diffuse_color, plain_color, to_levels
 from .samples import (
     DEPTH_SHIFT,
     EMPTY,
@@ -25,7 +25,22 @@ from .samples import (
     keep_nearer_pairs,
     store_pairs,
 )
-from .simd import LANES, ceil, even_lanes, gather, greater, lane, lesser, load, mask_word, splat, store, stream, to_int
+from .simd import (
+    LANES,
+    ceil,
+    even_lanes,
+    fused,
+    gather,
+    greater,
+    lane,
+    lesser,
+    load,
+    mask_word,
+    splat,
+    store,
+    stream,
+    to_int,
+)
 
 PAST_CACHES = 1 << 24  # pixels, 64 MB
 
@@ -33,7 +48,7 @@ PAST_CACHES = 1 << 24  # pixels, 64 MB
 class Place(NamedTuple):
     """What draw_segment reads of a block.
 
-    offsets (V + 7,) float32, places (V + 7,) int32: where each view's samples begin in the band, the last ones
+    offsets (V + LANES − 1,) float32, places likewise int32: where each view's samples begin in the band, the last ones
     repeated; number of views; columns first … end; sample_x; width of the picture.
     """
 
@@ -48,7 +63,7 @@ class Place(NamedTuple):
 
 @inlined
 def make_samples(k, runs, sample_x, what, scratch):
-    """The k-th sample that a segment covers in each of eight views: depth (empty where it does not) and colour.
+    """The k-th sample that a segment covers in each of LANES views: depth (empty where it does not) and colour.
 
     runs = (offset, first pixel, number of pixels, place in the band); what: see draw_segment.
     """
@@ -60,6 +75,8 @@ def make_samples(k, runs, sample_x, what, scratch):
     depth = depth_bits(run > step, z)
     if kind == PLAIN:
         color = plain_color(u, scratch.segment)
+    elif kind == DIFFUSE:  # light is cheaper than looking what is hidden
+        color = diffuse_color(u, shader, shading, scratch.segment)
     else:
         old = gather(scratch.halves, (address + k) * np.int32(2) + np.int32(1))
         seen = mask_word(depth > old)
@@ -84,8 +101,8 @@ def draw_segment(place, ends, depths, kind, shader, shading, scratch):
     what = (ends, depths, kind, reuse, shader, shading)
     for view in range(0, place.views, LANES):
         offset = load(offsets, view)
-        start = lesser(greater(ceil((offset * p1 + x1) - sample_x), low), high)
-        run = lesser(greater(ceil((offset * p2 + x2) - sample_x), low), high) - start
+        start = lesser(greater(ceil(fused(offset, p1, x1) - sample_x), low), high)
+        run = lesser(greater(ceil(fused(offset, p2, x2) - sample_x), low), high) - start
         address = load(places, view) + to_int(start - low)
         store(scratch.ints, 0, address)
         store(scratch.ints, LANES, address)
@@ -100,7 +117,7 @@ def draw_segment(place, ends, depths, kind, shader, shading, scratch):
 
 @inlined
 def take_colors(first, empty, halves):
-    """Colours of eight samples from `first` on, which are emptied while they are at hand."""
+    """Colours of LANES samples from `first` on, which are emptied while they are at hand."""
     k = np.uint64(2) * first
     low, high = load(halves, k), load(halves, k + np.uint64(LANES))
     store(halves, k, empty)
@@ -177,16 +194,13 @@ def store_means(row, columns, samples, sums, out):
             k += 4
 
 
-@kernel
-def draw_views(bins, surface, camera, shader, offsets, background, side, scratch, out, depth):
-    """Draw bins (first, end, blocks a row, columns per block) of every view into out (V, H, W) int32.
-
-    side² samples a pixel; depth (V, H, W) float32, or of no size when it is not wanted.
-    """
+@inlined
+def draw_bins(kind_of, bins, job, scratch, out, depth):
+    """Draw bins (first, end, blocks a row, columns per block); see draw_views."""
+    surface, camera, shader, offsets, places, background, side = job
     views, height, width = out.shape
     line = out.reshape(-1)
     span = (offsets[0], offsets[views - 1])
-    places = np.empty(offsets.shape[0], np.int32)
     clear_samples(0, views * min(bins[3], width), background, scratch.halves)
     for k in range(bins[0], bins[1]):
         row, first = k // bins[2], k % bins[2] * bins[3]
@@ -203,7 +217,7 @@ def draw_views(bins, surface, camera, shader, offsets, background, side, scratch
             sample = (0.5 + camera.spread * ((s % side + 0.5) / side - 0.5), (s // side + 0.5) / side)
             at, wide = np.float32(sample[0]), np.float32(width)
             place = Place(offsets, places, views, columns[0], columns[1], at, wide)
-            draw_row(draw_segment, place, span, row, k, surface, camera, shader, sample, scratch)
+            draw_row(draw_segment, kind_of, place, span, row, k, surface, camera, shader, sample, scratch)
             if side > 1:
                 add_samples(views * count, scratch.band, scratch.sums)
             if depth.size > 0:
@@ -213,3 +227,28 @@ def draw_views(bins, surface, camera, shader, offsets, background, side, scratch
             clear_samples(0, views * count, background, scratch.halves)
         else:
             store_views(row, columns, height, width, views, background, scratch.halves, line)
+
+
+@kernel
+def draw_views(bins, job, scratch, out, depth):
+    """Draw bins (first, end, blocks a row, columns per block) of every view into out (V, H, W) int32.
+
+    job = (surface, camera, shader, offsets, places, background, side), with side² samples a pixel and scratch memory
+    for Place.places; depth (V, H, W) float32, or of no size when it is not wanted.
+    """
+    draw_bins(any_kind, bins, job, scratch, out, depth)
+
+
+@kernel
+def draw_plain_views(bins, job, scratch, out, depth):
+    """draw_views where all materials are PLAIN."""
+    draw_bins(only_plain, bins, job, scratch, out, depth)
+
+
+@kernel
+def draw_diffuse_views(bins, job, scratch, out, depth):
+    """draw_views where all materials are DIFFUSE."""
+    draw_bins(only_diffuse, bins, job, scratch, out, depth)
+
+
+KERNELS = {PLAIN: draw_plain_views, DIFFUSE: draw_diffuse_views, ANY: draw_views}

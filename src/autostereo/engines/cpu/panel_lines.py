@@ -211,8 +211,10 @@ def add_line(n, j0, j1, x, address, offset, drift, plan, x0, starts, found, foun
     found[0, n] = np.float32(x + j0 * plan.period)
     found[1, n] = np.float32(j1 - j0 + 1)
     found[2, n] = np.float32(offset + j0 * drift)
-    found_ints[n] = address + j0 * plan.period
-    starts[bucket_of(found[0, n], found[2, n], plan, x0, starts.shape[0] - 1) + 1] += 1
+    found_ints[0, n] = address + j0 * plan.period
+    bucket = bucket_of(found[0, n], found[2, n], plan, x0, starts.shape[0] - 1)
+    found_ints[1, n] = bucket
+    starts[bucket + 1] += 1
     return n + 1
 
 
@@ -225,7 +227,7 @@ def make_lines(row, width, flip, columns, base, x0, plane, plan, starts, lines, 
     found, found_ints: like lines and addresses, scratch.
     """
     m, period, step = plan.map, plan.period, plan.step
-    n = 0
+    n, per_step = 0, 1.0 / step if abs(step) > 1e-9 else 0.0
     starts[:] = 0
     for rho in range(min(period, columns[1] - columns[0])):
         x = columns[0] + rho
@@ -247,7 +249,7 @@ def make_lines(row, width, flip, columns, base, x0, plane, plan, starts, lines, 
             ):
                 j0, j1 = 0, samples - 1
                 if abs(step) > 1e-9:
-                    first, last = (wrap - NEAR_WRAP - phi) / step, (wrap + 1 + NEAR_WRAP - phi) / step
+                    first, last = (wrap - NEAR_WRAP - phi) * per_step, (wrap + 1 + NEAR_WRAP - phi) * per_step
                     first, last = min(first, last), max(first, last)
                     j0, j1 = max(np.int64(np.ceil(first)), 0), min(np.int64(np.floor(last)), samples - 1)
                 if j0 <= j1:
@@ -257,11 +259,11 @@ def make_lines(row, width, flip, columns, base, x0, plane, plan, starts, lines, 
     for k in range(starts.shape[0] - 1):
         starts[k + 1] += starts[k]
     for k in range(n):
-        bucket = bucket_of(found[0, k], found[2, k], plan, x0, starts.shape[0] - 1)
+        bucket = found_ints[1, k]
         place = starts[bucket]
         starts[bucket] += 1
         lines[0, place], lines[1, place], lines[2, place] = found[0, k], found[1, k], found[2, k]
-        addresses[place] = found_ints[k]
+        addresses[place] = found_ints[0, k]
     for k in range(starts.shape[0] - 1, 0, -1):
         starts[k] = starts[k - 1]
     starts[0] = 0

@@ -1,7 +1,7 @@
 """Lists of a panel's samples that a segment or chord may cover: what meshes and points share.
 
 Of each line of sub-pixels (panel_lines) a stretch between two straight edges is an interval, found by two
-multiplications, eight lines at a time (SIMD over lines); the samples of all intervals make one list of addresses.
+multiplications, LANES lines at a time (SIMD over lines); the samples of all intervals make one list of addresses.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .simd import (
     to_int,
 )
 
-STRIDE = 1040  # room of a list: CAPACITY, what a step more adds, and what fills it up; no multiple of a page
+STRIDE = 1072  # room of a list: CAPACITY, what a step more adds, and what fills it up; no multiple of a page
 CAPACITY = 1000
 SLACK = np.float32(4e-3)  # rounding moves the end of a segment by less
 FAR = np.float32(1e9)
@@ -78,14 +78,14 @@ def edge_bound(x, slope, at, plan, spread, bounded_below):
 
 @inlined
 def bound_of(edge, xs, offsets):
-    """The bound that an edge_bound sets to eight lines."""
+    """The bound that an edge_bound sets to lines."""
     of_x, of_offset, constant = edge
     return (offsets * of_offset - xs * of_x) + constant
 
 
 @inlined
 def intervals(xs, offsets, numbers, first, second, both):
-    """Of eight lines the first sample that the stretch may cover, and the number of samples, as whole float32.
+    """Of lines the first sample that the stretch may cover, and the number of samples, as whole float32.
 
     first bounds from below, second from above; both = 0, or 1 (−1) where both bound from below (above).
     """
@@ -134,7 +134,7 @@ def draw_stretch(draw_listed, place, row, ends, what, scratch):
     """List the samples of a row that a stretch x1 + o·p1 ≤ x < x2 + o·p2 may cover; ends = (x1, p1, x2, p2).
 
     Calls draw_listed(n, place, row, ends, what, scratch) for at most CAPACITY samples at a time, whose addresses are in
-    scratch.ints; the list is filled up with the row's first sample to whole SIMD steps.
+    scratch.ints; the list is filled up with the row's first samples to whole SIMD steps.
     """
     left, right = swept(ends, place)
     if left > right:
@@ -151,7 +151,7 @@ def draw_stretch(draw_listed, place, row, ends, what, scratch):
     line, stop = lines_met(ends, place, starts)
     n, word, k = np.uint64(0), np.int32(0), np.int32(0)
     run, address = splat(np.int32(0)), splat(np.int32(0))
-    last = splat(np.int32(row * 3 * place.columns))
+    last = iota() + np.int32(row * 3 * place.columns)  # not one again and again: its depth would be waited for
     while line < stop or word != 0:
         while n <= np.uint64(CAPACITY):
             if word == 0:
@@ -178,7 +178,7 @@ def draw_stretch(draw_listed, place, row, ends, what, scratch):
 
 @inlined
 def samples_at(address, row, place):
-    """Pixel position and camera offset of eight samples, and which of them are green or blue, and blue."""
+    """Pixel position and camera offset of samples, and which of them are green or blue, and blue."""
     columns, two = np.int32(place.columns), np.int32(2 * place.columns)
     k = address - np.int32(row * 3 * place.columns)
     green, blue = k >= columns, k >= two

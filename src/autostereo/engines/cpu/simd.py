@@ -1,29 +1,46 @@
-"""Explicit SIMD for kernels: vectors of eight lanes, whatever registers the processor has.
+"""Explicit SIMD for kernels: vectors of sixteen lanes where the processor has AVX-512, elsewhere of eight.
 
-What a loop vectoriser must prove, a kernel can simply say here: `x = load(a, i)` brings eight float32, float64 or
-int32, operators work lane by lane, comparisons give masks, `select(mask, a, b)` chooses. LLVM makes one AVX or two SSE
-or NEON instructions of each. Scalars beside a vector are repeated over the lanes; they must be of the vector's kind.
+What a loop vectoriser must prove, a kernel can simply say here: `x = load(a, i)` brings LANES float32, float64 or
+int32, operators work lane by lane, comparisons give masks, `select(mask, a, b)` chooses. LLVM makes one AVX or a few
+SSE or NEON instructions of each. Scalars beside a vector are repeated over the lanes; they must be of its kind.
 
-Every function here is plain Python on NumPy arrays of eight elements: that is its definition, and what runs when
-Numba's JIT is off. Compiled, the same call becomes LLVM vector instructions (simd_compiled). No operation is reordered,
-fused or approximated, so a lane holds the same bits as the scalar expression would.
+Every function here is plain Python on NumPy arrays of LANES elements: that is its definition, and what runs when
+Numba's JIT is off. Compiled, the same call becomes LLVM vector instructions (simd_types, simd_compiled). No operation
+is reordered, and none but `fused`, `reciprocal` and `inverse_sqrt` approximated, so a lane holds the bits that the
+scalar expression would.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from llvmlite import binding
+from numba import config
 
-LANES = 8
+
+def _lanes() -> int:
+    """Sixteen where kernels are compiled for this machine and it has AVX-512, else eight."""
+    if config.CPU_NAME not in (None, "host") or config.CPU_FEATURES is not None:
+        return 8
+    features = binding.get_host_cpu_features()
+    return 16 if all(features.get(f"avx512{part}") for part in ("f", "vl", "bw", "dq")) else 8
+
+
+LANES = _lanes()
 
 
 def load(array, index):
-    """Eight elements of a float32, float64 or int32 array from `index` on."""
+    """LANES elements of a float32, float64 or int32 array from `index` on."""
     return array[index : index + LANES].copy()
 
 
+def load_eight(array, index):
+    """Eight elements of a float32 array from `index` on, however many lanes other vectors have."""
+    return array[index : index + 8].copy()
+
+
 def store(array, index, vector):
-    """Write eight elements from `index` on."""
-    array[index : index + LANES] = vector
+    """Write a vector's elements from `index` on."""
+    array[index : index + len(vector)] = vector
 
 
 def stream(array, index, vector):
@@ -32,7 +49,7 @@ def stream(array, index, vector):
 
 
 def gather(array, indices):
-    """array[i] for each of eight int32 indices, not negative."""
+    """array[i] for each of the int32 indices, not negative."""
     return array[indices]
 
 
@@ -49,7 +66,7 @@ def adjacent(array, index):
 def append(array, index, vector, mask):
     """Write the lanes of an int32 vector where the mask holds from `index` on.
 
-    Returns the index behind the last one written; what follows, up to eight elements in all, may change, too.
+    Returns the index behind the last one written; what follows, up to LANES elements in all, may change, too.
     """
     kept = vector[mask]
     array[index : index + len(kept)] = kept
@@ -71,12 +88,12 @@ def prefetch(array, index):
 
 
 def splat(value):
-    """Eight times a float32 or int32."""
+    """A float32 or int32 in every lane."""
     return np.full(LANES, value)
 
 
 def iota():
-    """0, 1, …, 7 as int32."""
+    """0, 1, …, LANES − 1 as int32."""
     return np.arange(LANES, dtype=np.int32)
 
 
@@ -108,6 +125,23 @@ def ceil(a):
 def fused(a, b, c):
     """a·b + c, rounded once where the processor can, so not the same bits everywhere: for what need not be."""
     return a * b + c
+
+
+def reciprocal(a):
+    """1/a within an ulp or two, so not the same bits everywhere; of 0 and of what has no reciprocal, any number."""
+    with np.errstate(divide="ignore"):
+        return np.float32(1.0) / a
+
+
+def inverse_sqrt(a):
+    """1/√a of normal numbers above 0, likewise near."""
+    return np.float32(1.0) / np.sqrt(a)
+
+
+def pack_bytes(r, g, b):
+    """RGBA words of red, green and blue as int32, each clamped to 0…255; opaque."""
+    r, g, b = (np.clip(c, 0, 255) for c in (r, g, b))
+    return r | (g << 8) | (b << 16) | np.int32(-1 << 24)
 
 
 def sqrt(a):
@@ -142,40 +176,42 @@ def mask_word(mask):
 
 
 def lane(vector, k):
-    """Element k, a constant or variable from 0 to 7."""
+    """Element k, a constant or variable from 0 to LANES − 1."""
     return vector[k]
 
 
 def low_halves(a, b):
-    """Lanes 0, 1 and 4, 5 of a and b, in turn: a0 b0 a1 b1 a4 b4 a5 b5 (AVX's unpacklo)."""
-    return np.array([a[0], b[0], a[1], b[1], a[4], b[4], a[5], b[5]])
+    """Of every four lanes of a and b the first two, in turn: a0 b0 a1 b1 a4 b4 a5 b5 … (AVX's unpacklo)."""
+    a, b = a.reshape(-1, 4), b.reshape(-1, 4)
+    return np.stack([a[:, 0], b[:, 0], a[:, 1], b[:, 1]], axis=1).ravel()
 
 
 def high_halves(a, b):
-    """a2 b2 a3 b3 a6 b6 a7 b7 (AVX's unpackhi)."""
-    return np.array([a[2], b[2], a[3], b[3], a[6], b[6], a[7], b[7]])
+    """a2 b2 a3 b3 a6 b6 a7 b7 … (AVX's unpackhi)."""
+    a, b = a.reshape(-1, 4), b.reshape(-1, 4)
+    return np.stack([a[:, 2], b[:, 2], a[:, 3], b[:, 3]], axis=1).ravel()
 
 
 def low_pairs(a, b):
-    """a0 a1 b0 b1 a4 a5 b4 b5."""
-    return np.array([a[0], a[1], b[0], b[1], a[4], a[5], b[4], b[5]])
+    """a0 a1 b0 b1 a4 a5 b4 b5 …"""
+    return np.concatenate([a.reshape(-1, 4)[:, :2], b.reshape(-1, 4)[:, :2]], axis=1).ravel()
 
 
 def high_pairs(a, b):
-    """a2 a3 b2 b3 a6 a7 b6 b7."""
-    return np.array([a[2], a[3], b[2], b[3], a[6], a[7], b[6], b[7]])
+    """a2 a3 b2 b3 a6 a7 b6 b7 …"""
+    return np.concatenate([a.reshape(-1, 4)[:, 2:], b.reshape(-1, 4)[:, 2:]], axis=1).ravel()
 
 
-def first_fours(a, b):
-    """a0 a1 a2 a3 b0 b1 b2 b3."""
-    return np.array([*a[:4], *b[:4]])
+def first_in_turn(a, b):
+    """The lower halves in turn: a0 b0 a1 b1 …"""
+    return np.stack([a, b], axis=1).ravel()[:LANES]
 
 
-def last_fours(a, b):
-    """a4 a5 a6 a7 b4 b5 b6 b7."""
-    return np.array([*a[4:], *b[4:]])
+def last_in_turn(a, b):
+    """The upper halves in turn."""
+    return np.stack([a, b], axis=1).ravel()[LANES:]
 
 
 def even_lanes(a, b):
-    """a0 a2 a4 a6 b0 b2 b4 b6."""
+    """a0 a2 a4 … b0 b2 b4 …"""
     return np.array([*a[::2], *b[::2]])

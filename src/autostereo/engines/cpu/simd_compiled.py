@@ -1,144 +1,38 @@
-"""How the functions of `simd` and the operators on its vectors are compiled: one LLVM instruction each, or a few."""
+"""How the functions of `simd` are compiled: one LLVM instruction each, or a few."""
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Callable
 from typing import Any
 
 from llvmlite import binding, ir
 from numba import config, types
 from numba.core import cgutils
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import lower_builtin, models, register_model, type_callable
+from numba.extending import lower_builtin, type_callable
 
 from . import simd
 from .simd import LANES
+from .simd_types import EIGHT, F32, F64, I32, LLVM, MASK, OF_SCALAR, VectorType, element, repeat, widen
 
 binding.initialize_native_asmparser()  # one instruction is written as assembly
 
+
+def _by_fours(order: tuple[int, ...]) -> tuple[int, ...]:
+    """An order of four lanes, repeated for every four."""
+    return tuple(4 * k + i for k in range(LANES // 4) for i in order)
+
+
 SHUFFLES: dict[Callable[..., Any], tuple[int, ...]] = {
-    simd.low_halves: (0, 8, 1, 9, 4, 12, 5, 13),
-    simd.high_halves: (2, 10, 3, 11, 6, 14, 7, 15),
-    simd.low_pairs: (0, 1, 8, 9, 4, 5, 12, 13),
-    simd.high_pairs: (2, 3, 10, 11, 6, 7, 14, 15),
-    simd.first_fours: (0, 1, 2, 3, 8, 9, 10, 11),
-    simd.last_fours: (4, 5, 6, 7, 12, 13, 14, 15),
-    simd.even_lanes: (0, 2, 4, 6, 8, 10, 12, 14),
+    simd.low_halves: _by_fours((0, LANES, 1, LANES + 1)),
+    simd.high_halves: _by_fours((2, LANES + 2, 3, LANES + 3)),
+    simd.low_pairs: _by_fours((0, 1, LANES, LANES + 1)),
+    simd.high_pairs: _by_fours((2, 3, LANES + 2, LANES + 3)),
+    simd.first_in_turn: tuple(k // 2 + LANES * (k % 2) for k in range(LANES)),
+    simd.last_in_turn: tuple((LANES + k) // 2 + LANES * (k % 2) for k in range(LANES)),
+    simd.even_lanes: tuple(range(0, 2 * LANES, 2)),
 }
 
 
-# --- types ----------------------------------------------------------------------------------------------------
-class VectorType(types.Type):
-    """Eight lanes of float32, float64, int32 or truth."""
-
-    def __init__(self, name: str, scalar: Any) -> None:
-        self.scalar = scalar
-        super().__init__(name=f"{name}x{LANES}")
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled by name: there is one of each kind, also in a cache of compiled kernels."""
-        return _kind, (self.name,)
-
-
-def _kind(name: str) -> VectorType:
-    return {kind.name: kind for kind in (F32, F64, I32, MASK)}[name]
-
-
-F32 = VectorType("float32", types.float32)
-F64 = VectorType("float64", types.float64)
-I32 = VectorType("int32", types.int32)
-MASK = VectorType("bool", types.boolean)
-_LLVM = {
-    F32: ir.VectorType(ir.FloatType(), LANES),
-    F64: ir.VectorType(ir.DoubleType(), LANES),
-    I32: ir.VectorType(ir.IntType(32), LANES),
-    MASK: ir.VectorType(ir.IntType(1), LANES),
-}
-_OF_SCALAR = {types.float32: F32, types.float64: F64, types.int32: I32}
-
-
-@register_model(VectorType)
-class VectorModel(models.PrimitiveModel):
-    """A vector lives in a register."""
-
-    def __init__(self, dmm: Any, fe_type: VectorType) -> None:
-        super().__init__(dmm, fe_type, _LLVM[fe_type])
-
-
-def _element(builder: Any, index: Any, value: Any) -> Any:
-    return builder.extract_element(value, ir.Constant(ir.IntType(32), index))
-
-
-def _repeat(builder: Any, value: Any) -> Any:
-    """A scalar in every lane."""
-    vector = ir.VectorType(value.type, LANES)
-    one = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.Constant(ir.IntType(32), 0))
-    zeros = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
-    return builder.shuffle_vector(one, ir.Constant(vector, ir.Undefined), zeros)
-
-
-def _widen(builder: Any, value: Any, kind: Any) -> Any:
-    return value if isinstance(kind, VectorType) else _repeat(builder, value)
-
-
-# --- operators --------------------------------------------------------------------------------------------------
-def _binary(op: Any, rules: dict[VectorType, tuple[VectorType, Callable[..., Any]]]) -> None:
-    """Type and lower `op` for two vectors, or a vector and a scalar of its kind."""
-
-    class Template(AbstractTemplate):
-        def generic(self, args: Any, kws: Any) -> Any:
-            a, b = args
-            kind = a if isinstance(a, VectorType) else b
-            if kind in rules and all(t is kind or t == kind.scalar for t in (a, b)):
-                return signature(rules[kind][0], a, b)
-            return None
-
-    infer_global(op)(Template)
-    for kind, (_, emit) in rules.items():
-        pairs = [(kind, kind), (kind, kind.scalar), (kind.scalar, kind)]
-        for pair in pairs:
-
-            def lower(context: Any, builder: Any, sig: Any, args: Any, emit: Any = emit) -> Any:
-                a, b = (_widen(builder, value, t) for value, t in zip(args, sig.args, strict=True))
-                return emit(builder, a, b)
-
-            lower_builtin(op, *pair)(lower)
-
-
-def _floats(emit: Callable[..., Any]) -> dict[VectorType, tuple[VectorType, Callable[..., Any]]]:
-    return {F32: (F32, emit), F64: (F64, emit)}
-
-
-def _ints(emit: Callable[..., Any]) -> dict[VectorType, tuple[VectorType, Callable[..., Any]]]:
-    return {I32: (I32, emit)}
-
-
-def _masks(emit: Callable[..., Any]) -> dict[VectorType, tuple[VectorType, Callable[..., Any]]]:
-    return {MASK: (MASK, emit)}
-
-
-def _compare(sign: str) -> dict[VectorType, tuple[VectorType, Callable[..., Any]]]:
-    def ordered(b: Any, x: Any, y: Any) -> Any:
-        return b.fcmp_ordered(sign, x, y)
-
-    return {F32: (MASK, ordered), F64: (MASK, ordered), I32: (MASK, lambda b, x, y: b.icmp_signed(sign, x, y))}
-
-
-_binary(operator.add, _floats(lambda b, x, y: b.fadd(x, y)) | _ints(lambda b, x, y: b.add(x, y)))
-_binary(operator.sub, _floats(lambda b, x, y: b.fsub(x, y)) | _ints(lambda b, x, y: b.sub(x, y)))
-_binary(operator.mul, _floats(lambda b, x, y: b.fmul(x, y)) | _ints(lambda b, x, y: b.mul(x, y)))
-_binary(operator.truediv, _floats(lambda b, x, y: b.fdiv(x, y)))
-_binary(operator.and_, _ints(lambda b, x, y: b.and_(x, y)) | _masks(lambda b, x, y: b.and_(x, y)))
-_binary(operator.or_, _ints(lambda b, x, y: b.or_(x, y)) | _masks(lambda b, x, y: b.or_(x, y)))
-_binary(operator.lshift, _ints(lambda b, x, y: b.shl(x, y)))
-_binary(operator.rshift, _ints(lambda b, x, y: b.ashr(x, y)))
-for _sign in ("<", "<=", ">", ">=", "=="):
-    _binary({"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "==": operator.eq}[_sign],
-            _compare(_sign))
-
-
-# --- functions --------------------------------------------------------------------------------------------------
 def _function(function: Any, accepts: Callable[..., Any], emit: Callable[..., Any]) -> None:
     """Type `function` by `accepts(*argument types)`, a result type or None, and lower it by `emit`."""
 
@@ -172,7 +66,7 @@ def _pointer(context: Any, builder: Any, kind: Any, array: Any, index: Any, inde
 
 
 def _vector_of(array: Any) -> Any:
-    return _OF_SCALAR.get(array.dtype) if isinstance(array, types.Array) and array.ndim == 1 else None
+    return OF_SCALAR.get(array.dtype) if isinstance(array, types.Array) and array.ndim == 1 else None
 
 
 def _splits(array: Any) -> bool:
@@ -183,7 +77,7 @@ def _splits(array: Any) -> bool:
 
 def _emit_load(context, builder, sig, args):
     pointer = _pointer(context, builder, sig.args[0], args[0], args[1], sig.args[1])
-    place = builder.bitcast(pointer, _LLVM[sig.return_type].as_pointer())
+    place = builder.bitcast(pointer, LLVM[sig.return_type].as_pointer())
     return builder.load(place, align=sig.return_type.scalar.bitwidth // 8)
 
 
@@ -203,13 +97,12 @@ def _emit_store(context, builder, sig, args):
 
 def _emit_stream(context, builder, sig, args):
     pointer = _pointer(context, builder, sig.args[0], args[0], args[1], sig.args[1])
-    half = LANES // 2
-    kind = ir.VectorType(args[2].type.element, half)
+    kind = ir.VectorType(args[2].type.element, 4)
     flag = builder.module.add_metadata([ir.Constant(ir.IntType(32), 1)])
-    for k in range(2):
-        order = ir.Constant(ir.VectorType(ir.IntType(32), half), [half * k + i for i in range(half)])
+    for k in range(0, LANES, 4):
+        order = ir.Constant(ir.VectorType(ir.IntType(32), 4), [k + i for i in range(4)])
         part = builder.shuffle_vector(args[2], args[2], order)
-        place = builder.gep(pointer, [ir.Constant(ir.IntType(64), half * k)])
+        place = builder.gep(pointer, [ir.Constant(ir.IntType(64), k)])
         if _has_avx2():  # said outright: LLVM for AVX-512 merges shuffle and store, and forgets to pass the caches
             call = ir.FunctionType(ir.VoidType(), [place.type, kind])
             builder.asm(call, "vmovntdq $1, ($0)", "r,x,~{memory}", [place, part], side_effect=True)
@@ -230,11 +123,15 @@ def _emit_append(context, builder, sig, args):
     wide = context.cast(builder, index, sig.args[1], types.uint64)
     data = context.make_array(sig.args[0])(context, builder, array).data
     word, byte = ir.IntType(32), ir.IntType(8)
-    number = builder.bitcast(mask, byte)
+    number = builder.bitcast(mask, ir.IntType(LANES))
+    if LANES == 16 and _has_avx2():
+        packed = _intrinsic(builder, "llvm.x86.avx512.mask.compress.v16i32", vector.type, vector, vector, mask)
+        builder.store(packed, builder.bitcast(builder.gep(data, [wide]), vector.type.as_pointer()), align=4)
+        return builder.add(wide, builder.zext(builder.ctpop(number), wide.type))
     if not _has_avx2():
         for k in range(LANES):
-            builder.store(_element(builder, k, vector), builder.gep(data, [wide]))
-            wide = builder.add(wide, builder.zext(_element(builder, k, mask), wide.type))
+            builder.store(element(builder, k, vector), builder.gep(data, [wide]))
+            wide = builder.add(wide, builder.zext(element(builder, k, mask), wide.type))
         return wide
     orders = [[k for k in range(LANES) if m >> k & 1] for m in range(256)]
     table = ir.Constant(ir.ArrayType(byte, 256 * LANES), [k for o in orders for k in (o + [0] * LANES)[:LANES]])
@@ -276,9 +173,9 @@ def _emit_prefetch(context, builder, sig, args):
 
 def _emit_gather(context, builder, sig, args):
     data = context.make_array(sig.args[0])(context, builder, args[0]).data
-    result = ir.Constant(_LLVM[sig.return_type], ir.Undefined)
+    result = ir.Constant(LLVM[sig.return_type], ir.Undefined)
     for k in range(LANES):
-        index = builder.zext(_element(builder, k, args[1]), ir.IntType(64))
+        index = builder.zext(element(builder, k, args[1]), ir.IntType(64))
         value = builder.load(builder.gep(data, [index]))
         result = builder.insert_element(result, value, ir.Constant(ir.IntType(32), k))
     return result
@@ -296,14 +193,67 @@ def _emit_call(name: str) -> Callable[..., Any]:
 
 
 def _emit_fused(context, builder, sig, args):
-    a, b, c = (_widen(builder, value, t) for value, t in zip(args, sig.args, strict=True))
-    kind = ir.FunctionType(a.type, [a.type] * 3)
-    return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.fmuladd.v{LANES}f32"), [a, b, c])
+    a, b, c = (widen(builder, value, t) for value, t in zip(args, sig.args, strict=True))
+    return _intrinsic(builder, f"llvm.fmuladd.v{LANES}f32", a.type, a, b, c)
+
+
+def _intrinsic(builder: Any, name: str, result: Any, *args: Any) -> Any:
+    kind = ir.FunctionType(result, [value.type for value in args])
+    return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), args)
+
+
+def _estimate(builder: Any, name: str, value: Any) -> Any:
+    """What the processor's instruction `name` (rcp or rsqrt) gives: 12 or 14 bits."""
+    vector = value.type
+    if LANES == 8:
+        return _intrinsic(builder, f"llvm.x86.avx.{name}.ps.256", vector, value)
+    zero, all_lanes = ir.Constant(vector, None), ir.Constant(ir.IntType(16), -1)
+    return _intrinsic(builder, f"llvm.x86.avx512.{name}14.ps.512", vector, value, zero, all_lanes)
+
+
+def _emit_reciprocal(context, builder, sig, args):
+    vector, fused = args[0].type, f"llvm.fmuladd.v{LANES}f32"
+    one = ir.Constant(vector, [1.0] * LANES)
+    if not _has_avx2():
+        return builder.fdiv(one, args[0])
+    near = _estimate(builder, "rcp", args[0])
+    off = _intrinsic(builder, fused, vector, builder.fneg(args[0]), near, one)  # Newton's step
+    return _intrinsic(builder, fused, vector, near, off, near)
+
+
+def _emit_inverse_sqrt(context, builder, sig, args):
+    vector, fused = args[0].type, f"llvm.fmuladd.v{LANES}f32"
+    one, half = (ir.Constant(vector, [value] * LANES) for value in (1.0, 0.5))
+    if not _has_avx2():
+        return builder.fdiv(one, _intrinsic(builder, f"llvm.sqrt.v{LANES}f32", vector, args[0]))
+    near = _estimate(builder, "rsqrt", args[0])
+    off = _intrinsic(builder, fused, vector, builder.fneg(builder.fmul(args[0], near)), near, one)
+    return _intrinsic(builder, fused, vector, builder.fmul(near, half), off, near)
+
+
+def _emit_pack_bytes(context, builder, sig, args):
+    r, g, b = args
+    word = ir.IntType(32)
+    if not _has_avx2():
+        low, high = (ir.Constant(r.type, [value] * LANES) for value in (0, 255))
+        r, g, b = (builder.select(builder.icmp_signed(">", c, low), c, low) for c in args)
+        r, g, b = (builder.select(builder.icmp_signed("<", c, high), c, high) for c in (r, g, b))
+        shift = [ir.Constant(r.type, [value] * LANES) for value in (8, 16, -1 << 24)]
+        return builder.or_(builder.or_(r, shift[2]), builder.or_(builder.shl(g, shift[0]), builder.shl(b, shift[1])))
+    shorts, many = ir.VectorType(ir.IntType(16), 2 * LANES), ir.VectorType(ir.IntType(8), 4 * LANES)
+    family, size = ("avx512", ".512") if LANES == 16 else ("avx2", "")
+    alpha = ir.Constant(r.type, [255] * LANES)
+    rg = _intrinsic(builder, f"llvm.x86.{family}.packssdw{size}", shorts, r, g)
+    ba = _intrinsic(builder, f"llvm.x86.{family}.packssdw{size}", shorts, b, alpha)
+    apart = _intrinsic(builder, f"llvm.x86.{family}.packuswb{size}", many, rg, ba)  # of four lanes r, then g, b, a
+    order = [16 * k + 4 * c + i for k in range(LANES // 4) for i in range(4) for c in range(4)]
+    mixed = builder.shuffle_vector(apart, apart, ir.Constant(ir.VectorType(word, 4 * LANES), order))
+    return builder.bitcast(mixed, r.type)
 
 
 def _emit_choice(sign: str) -> Callable[..., Any]:
     def emit(context, builder, sig, args):
-        a, b = (_widen(builder, value, t) for value, t in zip(args, sig.args, strict=True))
+        a, b = (widen(builder, value, t) for value, t in zip(args, sig.args, strict=True))
         compare = builder.icmp_signed if sig.return_type is I32 else builder.fcmp_ordered
         return builder.select(compare(sign, a, b), a, b)
 
@@ -312,11 +262,11 @@ def _emit_choice(sign: str) -> Callable[..., Any]:
 
 def _emit_to_float(context, builder, sig, args):
     convert = builder.sitofp if sig.args[0] is I32 else builder.fptrunc
-    return convert(args[0], _LLVM[F32])
+    return convert(args[0], LLVM[F32])
 
 
 def _emit_select(context, builder, sig, args):
-    a, b = (_widen(builder, value, t) for value, t in zip(args[1:], sig.args[1:], strict=True))
+    a, b = (widen(builder, value, t) for value, t in zip(args[1:], sig.args[1:], strict=True))
     return builder.select(args[0], a, b)
 
 
@@ -344,8 +294,13 @@ def _both(a: Any, b: Any) -> Any:
 
 
 _function(simd.load, lambda array, index: _vector_of(array), _emit_load)
+_function(simd.load_eight, lambda array, index: EIGHT if _vector_of(array) is F32 else None, _emit_load)
 _function(simd.adjacent, lambda array, index: types.int64 if _splits(array) else None, _emit_adjacent)
-_function(simd.store, lambda array, index, vector: types.none if _vector_of(array) is vector else None, _emit_store)
+_function(
+    simd.store,
+    lambda array, index, vector: types.none if vector in (_vector_of(array), EIGHT) else None,
+    _emit_store,
+)
 _function(
     simd.keep_greater,
     lambda array, places, words, k, mask: types.none if array.dtype == words.dtype == mask == types.int64 else None,
@@ -359,18 +314,25 @@ _function(
 _function(simd.prefetch, lambda array, index: types.none if isinstance(array, types.Array) else None, _emit_prefetch)
 _function(simd.stream, lambda array, index, vector: types.none if _vector_of(array) is vector else None, _emit_stream)
 _function(simd.gather, lambda array, indices: _vector_of(array) if indices is I32 else None, _emit_gather)
-_function(simd.splat, lambda value: _OF_SCALAR.get(value), lambda c, b, s, a: _repeat(b, a[0]))
-_function(simd.iota, lambda: I32, lambda c, b, s, a: ir.Constant(_LLVM[I32], list(range(LANES))))
+_function(simd.splat, lambda value: OF_SCALAR.get(value), lambda c, b, s, a: repeat(b, a[0]))
+_function(simd.iota, lambda: I32, lambda c, b, s, a: ir.Constant(LLVM[I32], list(range(LANES))))
 _function(simd.select, lambda mask, a, b: _both(a, b) if mask is MASK else None, _emit_select)
 _function(simd.lesser, lambda a, b: _both(a, b), _emit_choice("<"))
 _function(simd.greater, lambda a, b: _both(a, b), _emit_choice(">"))
-_function(simd.fused, lambda a, b, c: F32 if a is b is c is F32 else None, _emit_fused)
+_function(
+    simd.fused,
+    lambda a, b, c: F32 if F32 in (a, b, c) and all(t in (F32, types.float32) for t in (a, b, c)) else None,
+    _emit_fused,
+)
+_function(simd.reciprocal, lambda a: F32 if a is F32 else None, _emit_reciprocal)
+_function(simd.inverse_sqrt, lambda a: F32 if a is F32 else None, _emit_inverse_sqrt)
+_function(simd.pack_bytes, lambda r, g, b: I32 if r is g is b is I32 else None, _emit_pack_bytes)
 for _name, _call in (("floor", simd.floor), ("ceil", simd.ceil), ("sqrt", simd.sqrt)):
     _function(_call, lambda a: F32 if a is F32 else None, _emit_call(_name))
-_function(simd.to_int, lambda a: I32 if a is F32 else None, lambda c, b, s, a: b.fptosi(a[0], _LLVM[I32]))
+_function(simd.to_int, lambda a: I32 if a is F32 else None, lambda c, b, s, a: b.fptosi(a[0], LLVM[I32]))
 _function(simd.to_float, lambda a: F32 if a is I32 or a is F64 else None, _emit_to_float)
-_function(simd.bits, lambda a: I32 if a is F32 else None, lambda c, b, s, a: b.bitcast(a[0], _LLVM[I32]))
-_function(simd.from_bits, lambda a: F32 if a is I32 else None, lambda c, b, s, a: b.bitcast(a[0], _LLVM[F32]))
+_function(simd.bits, lambda a: I32 if a is F32 else None, lambda c, b, s, a: b.bitcast(a[0], LLVM[I32]))
+_function(simd.from_bits, lambda a: F32 if a is I32 else None, lambda c, b, s, a: b.bitcast(a[0], LLVM[F32]))
 _function(simd.mask_word, lambda mask: types.int32 if mask is MASK else None, _emit_mask_word)
 _function(simd.lane, lambda vector, k: vector.scalar if isinstance(vector, VectorType) else None, _emit_lane)
 for _shuffle, _order in SHUFFLES.items():

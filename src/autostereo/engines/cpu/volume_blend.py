@@ -20,7 +20,7 @@ STEP = 3 * LANES  # pixels whose sums stay in registers while they go through al
 
 @inlined
 def add_positions(near, beside, part, values, sums):
-    """Add eight positions of a slab, between two neighbours, to the sums (red, green, blue, transmittance)."""
+    """Add LANES positions of a slab, between two neighbours, to the sums (red, green, blue, transmittance)."""
     through = sums[3]
     right = through * part
     left = through - right
@@ -32,13 +32,13 @@ def add_positions(near, beside, part, values, sums):
 
 @inlined
 def load_sums(i, line):
-    """Sums of eight pixels."""
+    """Sums of LANES pixels."""
     return load(line, i + RED), load(line, i + GREEN), load(line, i + BLUE), load(line, i + ALPHA)
 
 
 @inlined
 def store_sums(i, sums, line):
-    """Keep sums of eight pixels."""
+    """Keep sums of LANES pixels."""
     store(line, i + RED, sums[0])
     store(line, i + GREEN, sums[1])
     store(line, i + BLUE, sums[2])

@@ -20,12 +20,10 @@ from .scalars import exp2_fast
 from .simd import (
     LANES,
     append,
-    first_fours,
-    high_halves,
+    first_in_turn,
     iota,
-    last_fours,
+    last_in_turn,
     load,
-    low_halves,
     mask_word,
     splat,
     store,
@@ -70,7 +68,7 @@ SLAB_ROWS = 4
 POSITION, NEAR, BESIDE = 0, 1, 2
 PAIRS = RAYS - LANES  # of positions that are handled together: one sampled, one between that and the next
 BEND, THREE = np.float32(0.016), np.float32(3.0)  # 16 times how far a value may depart from what it is interpolated to
-SPAN = 32  # positions of a phase of which it is known whether something is seen
+SPAN = 4 * LANES  # positions of a phase of which it is known whether something is seen
 
 
 class Shared(NamedTuple):
@@ -151,7 +149,7 @@ def look_up_plain(n, scalar, plain, numbers, found, rays):
 
 @inlined
 def smooth_between(i, row, rays):
-    """Middle of eight neighbouring values and the next ones; where it may be far from what lies between.
+    """Middle of LANES neighbouring values and the next ones; where it may be far from what lies between.
 
     Four values in a row tell how far a cubic through them departs from a straight line, and whether they jump.
     """
@@ -232,10 +230,9 @@ def keep_row_of_both(n, row, between, sign, place, values, rays):
     """Keep a row of values and of those between them, in turn."""
     for i in range(np.uint64(0), n, np.uint64(LANES)):
         a, b = load(rays, row + i) * sign, load(rays, between + row + i) * sign
-        low, high = low_halves(a, b), high_halves(a, b)
         to = place + i + i
-        store(values, to, first_fours(low, high))
-        store(values, to + np.uint64(LANES), last_fours(low, high))
+        store(values, to, first_in_turn(a, b))
+        store(values, to + np.uint64(LANES), last_in_turn(a, b))
 
 
 @inlined

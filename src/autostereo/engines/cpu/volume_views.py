@@ -215,8 +215,8 @@ def draw_rows(rows, cuts, camera, slices, ways, offsets, wants_depth, planes, ra
 
 
 @inlined
-def over_eight(front, through, behind, shift):
-    """`over` for one byte of eight pixels, shifted back to its place."""
+def over_lanes(front, through, behind, shift):
+    """`over` for one byte of LANES pixels, shifted back to its place."""
     value = front * BYTE + through * to_float((behind >> shift) & np.int32(255)) + HALF_WAY
     return to_int(lesser(greater(value, ZERO), BYTE)) << shift
 
@@ -228,9 +228,9 @@ def finish_line(width, t, line, first, words):
     for x in range(0, whole, LANES):
         i, place = np.uint64(t + x), np.uint64(first + x)
         (red, green, blue, through), behind = load_sums(i, line), load(words, place)
-        red, green = over_eight(red, through, behind, np.int32(0)), over_eight(green, through, behind, np.int32(8))
-        blue = over_eight(blue, through, behind, np.int32(16))
-        alpha = over_eight(splat(ONE) - through, through, behind, np.int32(24))
+        red, green = over_lanes(red, through, behind, np.int32(0)), over_lanes(green, through, behind, np.int32(8))
+        blue = over_lanes(blue, through, behind, np.int32(16))
+        alpha = over_lanes(splat(ONE) - through, through, behind, np.int32(24))
         store(words, place, red | green | blue | alpha)
     for x in range(whole, width):
         i, place = np.uint64(t + x), np.uint64(first + x)
