@@ -82,6 +82,19 @@ def test_dots_slide_by_the_disparity_law(depth):
     np.testing.assert_allclose(centroid, wanted[seen], atol=0.5)
 
 
+def test_reuse_in_one_view_is_exact_with_textures_too():
+    """The only view is an exact one, whose colours are made a whole row of a triangle at a time."""
+    plane = shapes.plane((4, 4))
+    texture = np.random.default_rng(0).integers(0, 256, (16, 16, 3)).astype(np.uint8)
+    scene = aus.Scene((replace(plane, texture=texture),))
+    rig = aus.Rig(position=(0, 0, 4), fov_y=40, views=1)
+    exact, reused = (
+        aus.render_views(scene, rig, (64, 48), engine="cpu", options=aus.Options(shading=shading)).color
+        for shading in ("exact", "reuse")
+    )
+    assert np.array_equal(exact, reused)
+
+
 def test_reuse_keeps_silhouettes_and_exact_views_and_counts():
     rig = aus.Rig(views=16, baseline=0.6)
     scene = aus.Scene([shapes.uv_sphere(24, 48), shapes.torus()])

@@ -17,7 +17,7 @@ from .scalars import ONE, ZERO
 from .simd import LANES, iota, lane, load, splat, store, to_float
 
 VIEWS_PER_SET = 8
-ALL = np.int32(255)
+ALL = np.int32(-1)  # every sample is seen
 
 
 def exact_offsets(offsets):
