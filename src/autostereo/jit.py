@@ -97,7 +97,7 @@ def _key(folder: Path) -> str:
     from llvmlite import binding
 
     processor = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
-    chosen = numba.config.CPU_NAME, numba.config.CPU_FEATURES
+    chosen = numba.config.CPU_NAME, numba.config.CPU_FEATURES, numba.config.ENABLE_AVX
     digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:3]} {folder} {processor} {chosen}".encode())
     for source in sorted(folder.glob("*.py")):
         digest.update(source.read_bytes())

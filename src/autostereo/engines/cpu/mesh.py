@@ -176,7 +176,7 @@ def new_block(rows: int, columns: int, plan: LinePlan) -> Block:
 
 
 def panel_block(width: int) -> int:
-    """Columns of a panel's block for which samples and offsets stay in cache."""
+    """Columns of a panel's block, for whose samples and offsets 36 bytes a pixel are at hand."""
     blocks = -(-width // PANEL_COLUMNS)
     return (-(-width // blocks) + 15) // 16 * 16
 

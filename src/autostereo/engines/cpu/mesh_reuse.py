@@ -14,7 +14,7 @@ from .jit import inlined, kernel
 from .mesh_shade import DIFFUSE, diffuse_color, shade
 from .samples import hit
 from .scalars import ONE, ZERO
-from .simd import LANES, iota, lane, load, splat, store, to_float
+from .simd import LANES, fused, iota, lane, load, splat, store, to_float
 
 VIEWS_PER_SET = 8
 ALL = np.int32(-1)  # every sample is seen
@@ -37,8 +37,9 @@ def shade_exact(ends, depths, at, width, shader, shading, scratch):
     filled = np.int32(0)
     for e in range(shader.exact.shape[0]):
         offset = shader.exact[e]
-        start = np.int32(np.ceil(min(max(x1 + offset * p1 - at, ZERO), width)))
-        end = np.int32(np.ceil(min(max(x2 + offset * p2 - at, ZERO), width)))
+        left, right = lane(fused(splat(offset), p1, x1), 0), lane(fused(splat(offset), p2, x2), 0)  # as in `hit`
+        start = np.int32(np.ceil(min(max(left - at, ZERO), width)))
+        end = np.int32(np.ceil(min(max(right - at, ZERO), width)))
         spans[0, e], spans[1, e], spans[2, e] = start, max(end - start, np.int32(0)), filled
         for k in range(0, spans[1, e], LANES):
             x = (to_float(iota()) + np.float32(start + np.int32(k))) + at

@@ -224,7 +224,7 @@ def make_lines(row, width, flip, columns, base, x0, plane, plan, starts, lines, 
 
     lines (3, N) float32: pixel of the first sample, number of samples, offset of the first; addresses (N,) int32:
     place of the first sample, see row_offsets; starts: first line of each bucket from x0 − lead on, and after the last.
-    found, found_ints: like lines and addresses, scratch.
+    found, and found_ints (2, N) of addresses and buckets: scratch.
     """
     m, period, step = plan.map, plan.period, plan.step
     n, per_step = 0, 1.0 / step if abs(step) > 1e-9 else 0.0

@@ -17,12 +17,16 @@ from llvmlite import binding
 from numba import config
 
 
+def has_feature(name: str) -> bool:
+    """Whether kernels are compiled for this machine, with AVX, and its processor has a feature by LLVM's name."""
+    if config.CPU_NAME not in (None, "host") or config.CPU_FEATURES is not None or not config.ENABLE_AVX:
+        return False
+    return "x86_64" in binding.get_process_triple() and bool(binding.get_host_cpu_features().get(name))
+
+
 def _lanes() -> int:
     """Sixteen where kernels are compiled for this machine and it has AVX-512, else eight."""
-    if config.CPU_NAME not in (None, "host") or config.CPU_FEATURES is not None:
-        return 8
-    features = binding.get_host_cpu_features()
-    return 16 if all(features.get(f"avx512{part}") for part in ("f", "vl", "bw", "dq")) else 8
+    return 16 if all(has_feature(f"avx512{part}") for part in ("f", "vl", "bw", "dq")) else 8
 
 
 LANES = _lanes()
@@ -142,11 +146,6 @@ def pack_bytes(r, g, b):
     """RGBA words of red, green and blue as int32, each clamped to 0…255; opaque."""
     r, g, b = (np.clip(c, 0, 255) for c in (r, g, b))
     return r | (g << 8) | (b << 16) | np.int32(-1 << 24)
-
-
-def sqrt(a):
-    """Square root."""
-    return np.sqrt(a)
 
 
 def to_int(a):

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from llvmlite import binding, ir
-from numba import config, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import lower_builtin, type_callable
 
@@ -69,6 +69,12 @@ def _vector_of(array: Any) -> Any:
     return OF_SCALAR.get(array.dtype) if isinstance(array, types.Array) and array.ndim == 1 else None
 
 
+def _holds(array: Any, vector: Any) -> bool:
+    """Whether `store` takes them."""
+    kind = _vector_of(array)
+    return kind is not None and (vector is kind or (vector is EIGHT and kind is F32))
+
+
 def _splits(array: Any) -> bool:
     """Whether `adjacent` takes the array."""
     kinds = (types.uint8, types.uint16, types.uint32, types.float32)
@@ -112,10 +118,8 @@ def _emit_stream(context, builder, sig, args):
 
 
 def _has_avx2() -> bool:
-    """Whether kernels are compiled for this machine, and it has AVX2."""
-    if config.CPU_NAME not in (None, "host") or config.CPU_FEATURES is not None:
-        return False
-    return "x86_64" in binding.get_process_triple() and bool(binding.get_host_cpu_features().get("avx2"))
+    """Whether AVX2's instructions may be said outright, and where there are sixteen lanes AVX-512's."""
+    return simd.has_feature("avx2")
 
 
 def _emit_append(context, builder, sig, args):
@@ -289,7 +293,7 @@ def _emit_shuffle(order: tuple[int, ...]) -> Callable[..., Any]:
 def _both(a: Any, b: Any) -> Any:
     """The vector that two arguments make, one of them perhaps a scalar of its kind."""
     kind = a if isinstance(a, VectorType) else b
-    fits = isinstance(kind, VectorType) and all(t is kind or t == kind.scalar for t in (a, b))
+    fits = isinstance(kind, VectorType) and kind.lanes == LANES and all(t is kind or t == kind.scalar for t in (a, b))
     return kind if fits else None
 
 
@@ -298,7 +302,7 @@ _function(simd.load_eight, lambda array, index: EIGHT if _vector_of(array) is F3
 _function(simd.adjacent, lambda array, index: types.int64 if _splits(array) else None, _emit_adjacent)
 _function(
     simd.store,
-    lambda array, index, vector: types.none if vector in (_vector_of(array), EIGHT) else None,
+    lambda array, index, vector: types.none if _holds(array, vector) else None,
     _emit_store,
 )
 _function(
@@ -327,7 +331,7 @@ _function(
 _function(simd.reciprocal, lambda a: F32 if a is F32 else None, _emit_reciprocal)
 _function(simd.inverse_sqrt, lambda a: F32 if a is F32 else None, _emit_inverse_sqrt)
 _function(simd.pack_bytes, lambda r, g, b: I32 if r is g is b is I32 else None, _emit_pack_bytes)
-for _name, _call in (("floor", simd.floor), ("ceil", simd.ceil), ("sqrt", simd.sqrt)):
+for _name, _call in (("floor", simd.floor), ("ceil", simd.ceil)):
     _function(_call, lambda a: F32 if a is F32 else None, _emit_call(_name))
 _function(simd.to_int, lambda a: I32 if a is F32 else None, lambda c, b, s, a: b.fptosi(a[0], LLVM[I32]))
 _function(simd.to_float, lambda a: F32 if a is I32 or a is F64 else None, _emit_to_float)
