@@ -126,9 +126,7 @@ def draw_mesh_panel(prepared: PreparedMeshes, draw: Draw, target: Target, memory
 
 def only_kind(surface: Surface, shader: Shader) -> int:
     """What shades every triangle: PLAIN or DIFFUSE where that holds for all, else ANY."""
-    if not surface.materials[:, 6].all():
-        return ANY
-    return PLAIN if not shader.per_sample else DIFFUSE if shader.diffuse else ANY
+    return shader.simple if surface.materials[:, 6].all() else ANY
 
 
 def new_scratch(samples: int, sums: int, exact: tuple[int, int]) -> Scratch:
@@ -228,7 +226,7 @@ def surface_at(
         sides,
     )  # fmt: skip
     own_eye = np.float32(options.shading != "center")
-    diffuse = options.shading != "reuse" and not lights[:, 0].any()
+    directional = options.shading != "reuse" and not lights[:, 0].any()
     exact = exact_offsets(draw.offsets) if options.shading == "reuse" else np.empty(0, np.float32)
     shader = Shader(
         lights,
@@ -237,7 +235,7 @@ def surface_at(
         arrays.level_count,
         per_sample,
         own_eye,
-        diffuse,
+        PLAIN if not per_sample else DIFFUSE if directional else ANY,
         exact,
         np.float32(camera.fx / camera.focal),
     )

@@ -64,9 +64,7 @@ def only_diffuse(materials, m, shader):
 @inlined
 def any_kind(materials, m, shader):
     """What shades material m: PLAIN, DIFFUSE or ANY."""
-    if materials[m, 6] == ZERO:
-        return ANY
-    return PLAIN if not shader.per_sample else DIFFUSE if shader.diffuse else ANY
+    return shader.simple if materials[m, 6] != ZERO else ANY
 
 
 @inlined

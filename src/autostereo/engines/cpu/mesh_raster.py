@@ -75,8 +75,8 @@ class Shader(NamedTuple):
     reference, atomically.)
 
     lights (L, 8) float32 (scene_arrays.light_array); texels, texture_levels, level_count as in SceneArrays; own_eye
-    1 or 0; diffuse: there are but directional lights, and no reuse; exact (E,) float32: offsets of exact views, none
-    without reuse; slide: fx/focal.
+    1 or 0; simple: what shades plain materials, DIFFUSE where there are but directional lights, and no reuse; exact
+    (E,) float32: offsets of exact views, none without reuse; slide: fx/focal.
     """
 
     lights: np.ndarray
@@ -85,7 +85,7 @@ class Shader(NamedTuple):
     level_count: np.ndarray
     per_sample: bool
     own_eye: np.float32
-    diffuse: bool
+    simple: int
     exact: np.ndarray
     slide: np.float32
 

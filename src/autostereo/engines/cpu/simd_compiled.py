@@ -144,9 +144,7 @@ def _emit_append(context, builder, sig, args):
         [ir.Constant(word, 0), builder.mul(builder.zext(number, word), ir.Constant(word, LANES))],
     )
     order = builder.load(builder.bitcast(place, ir.VectorType(byte, LANES).as_pointer()), align=1)
-    kind = ir.FunctionType(vector.type, [vector.type, vector.type])
-    permute = cgutils.get_or_insert_function(builder.module, kind, "llvm.x86.avx2.permd")
-    packed = builder.call(permute, [vector, builder.zext(order, vector.type)])
+    packed = _intrinsic(builder, "llvm.x86.avx2.permd", vector.type, vector, builder.zext(order, vector.type))
     builder.store(packed, builder.bitcast(builder.gep(data, [wide]), vector.type.as_pointer()), align=4)
     return builder.add(wide, builder.zext(builder.ctpop(number), wide.type))
 
@@ -187,11 +185,7 @@ def _emit_gather(context, builder, sig, args):
 
 def _emit_call(name: str) -> Callable[..., Any]:
     def emit(context, builder, sig, args):
-        vector = args[0].type
-        function = cgutils.get_or_insert_function(
-            builder.module, ir.FunctionType(vector, [vector]), f"llvm.{name}.v{LANES}f32"
-        )
-        return builder.call(function, args)
+        return _intrinsic(builder, f"llvm.{name}.v{LANES}f32", args[0].type, args[0])
 
     return emit
 
